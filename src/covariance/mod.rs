@@ -1,0 +1,3 @@
+//! Covariance.
+mod parameters;
+pub use parameters::{ParameterCovariance, ParameterLayout};

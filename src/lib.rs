@@ -1,0 +1,4 @@
+//! innovant
+pub mod covariance;
+pub mod linalg;
+pub mod model;

@@ -1,0 +1,3 @@
+//! The model.
+mod state_space;
+pub use state_space::StateSpace;
