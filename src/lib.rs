@@ -2,3 +2,4 @@
 pub mod covariance;
 pub mod linalg;
 pub mod model;
+pub mod moments;

@@ -81,8 +81,9 @@ impl ParameterLayout {
     /// not among the parameters.
     pub fn unpack(&self, theta: &[f64], like: &StateSpace) -> StateSpace {
         let (n, r, l) = (self.states, self.inputs, self.outputs);
-        let matrix =
-            |from: usize, rows: usize, columns: usize| DMatrix::from_column_slice(rows, columns, &theta[from..from + rows * columns]);
+        let matrix = |from: usize, rows: usize, columns: usize| {
+            DMatrix::from_column_slice(rows, columns, &theta[from..from + rows * columns])
+        };
         StateSpace {
             a: matrix(0, n, n),
             b: matrix(self.b(), n, r),

@@ -169,7 +169,11 @@ mod tests {
                 assert!((d[(i, j)] - expected).norm() < 1e-12);
             }
         }
-        assert!((spectral_radius(&a).unwrap() - e.values.iter().map(|v| v.norm()).fold(0.0, f64::max)).abs() < 1e-12);
+        assert!(
+            (spectral_radius(&a).unwrap() - e.values.iter().map(|v| v.norm()).fold(0.0, f64::max))
+                .abs()
+                < 1e-12
+        );
     }
 
     #[test]

@@ -12,4 +12,3 @@ pub(super) fn view(matrix: &DMatrix<f64>) -> MatRef<'_, f64> {
 pub(super) fn owned(matrix: MatRef<'_, f64>) -> DMatrix<f64> {
     DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)])
 }
-

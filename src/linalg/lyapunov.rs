@@ -11,10 +11,7 @@ use super::qr::qr_thin;
 ///
 /// # Errors
 /// [`LinalgError::NotStable`] when the spectral radius of `A` is not below one.
-pub fn discrete_lyapunov(
-    a: &DMatrix<f64>,
-    q: &DMatrix<f64>,
-) -> Result<DMatrix<f64>, LinalgError> {
+pub fn discrete_lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, LinalgError> {
     let radius = spectral_radius(a)?;
     if radius >= 1.0 {
         return Err(LinalgError::NotStable {
@@ -78,8 +75,7 @@ pub fn stabilising_observer_gain(
         .clone()
         .try_inverse()
         .ok_or(LinalgError::Singular { what })?;
-    let constant =
-        inverse.transpose() * c_unstable.transpose() * weight * &c_unstable * &inverse;
+    let constant = inverse.transpose() * c_unstable.transpose() * weight * &c_unstable * &inverse;
     let information = discrete_lyapunov(&inverse.transpose(), &constant)?;
     let p = information
         .try_inverse()

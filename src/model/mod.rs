@@ -1,3 +1,37 @@
-//! The model.
+//! The model: a state-space system in innovation form, and what can be computed from it alone.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `state_space` | [`StateSpace`]: matrices, checks, change of basis |
+//! | `recursion` | the one loop over samples that simulation and prediction share |
+//! | `simulate` | free run from inputs (and innovations), also block by block: [`Simulator`] |
+//! | `predict` | one-step predictions and innovations, also block by block: [`Predictor`] |
+//! | `initial_state` | the initial state that explains a recording best |
+//! | `frequency` | frequency responses from input and from innovation, default frequency grid |
+//! | `poles` | poles with natural frequency, damping, time constant |
+//! | `zeros` | invariant zeros |
+//! | `response` | impulse and step responses, static gain |
+//! | `armax` | the polynomials of a single-input single-output model |
+//! | `error` | [`ModelError`] |
+
+mod armax;
+mod error;
+mod frequency;
+mod initial_state;
+mod poles;
+mod predict;
+mod recursion;
+mod response;
+mod simulate;
 mod state_space;
+mod zeros;
+
+pub use armax::Armax;
+pub use error::ModelError;
+pub(crate) use frequency::resolvent_products;
+pub use initial_state::estimate_initial_state;
+pub use poles::Pole;
+pub(crate) use poles::{INTEGRATOR_TOLERANCE, slowest_first};
+pub use predict::{Prediction, Predictor};
+pub use simulate::Simulator;
 pub use state_space::StateSpace;

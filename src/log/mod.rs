@@ -1,0 +1,63 @@
+//! Recordings in and out: a [`Log`] is a time base with named inputs and outputs.
+//!
+//! A recording is a CSV file: one column a signal, one row a sample, headers such as `force [N]`. It is read as a
+//! *stream* of column-major blocks ([`LogReader`]), in memory that does not grow with the file, while the sampling is
+//! checked and the bytes are hashed; [`Log::read`] collects the blocks of a record which fits in memory.
+//!
+//! | file          | one idea                                                        |
+//! |---------------|-----------------------------------------------------------------|
+//! | `source`      | where bytes come from: file, standard input, gzip; SHA-256      |
+//! | `lines`       | bytes to whole lines in a bounded buffer                        |
+//! | `header`      | the first line: separator, names, units                         |
+//! | `roles`       | which column is input, output, time                             |
+//! | `decimal`     | text to the nearest `f64`, fast                                 |
+//! | `parse`       | rows to columns                                                 |
+//! | `sampling`    | is the time base uniform, and what is its step                  |
+//! | `reader`      | the five above, put together as a stream of blocks              |
+//! | `record`      | a whole record in memory                                        |
+//! | `writer`      | columns to CSV; `atomic`: a file appears whole or not at all    |
+//!
+//! # What is accepted
+//! UTF-8 text (a byte order mark is skipped), lines ended by LF or CRLF, a separator `,`, `;` or tab found in the
+//! header, quotes and spaces around fields, comment lines (`#`) and blank lines before the header, blank lines at the
+//! end. A file whose first row is all numbers has no header; its columns are named `1`, `2`, ... Text is allowed in
+//! columns that have no role. Everything else is a [`LogError`] that names the file, the line and the column.
+//!
+//! # Example
+//! ```
+//! use innovant::log::{Log, Roles};
+//!
+//! let csv = "t,u [V],y [rad/s]\n0.0,1,0.00\n0.1,1,0.39\n0.2,0,0.63\n";
+//! let log = Log::from_reader("motor.csv", csv.as_bytes(), &Roles::default())?;
+//! assert_eq!(log.sample_time, 0.1);
+//! assert_eq!(log.inputs[0].to_string(), "u [V]");
+//! assert_eq!(log.output_data[0], [0.0, 0.39, 0.63]);
+//! # Ok::<(), innovant::log::LogError>(())
+//! ```
+
+mod atomic;
+mod channel;
+mod decimal;
+mod error;
+mod header;
+mod lines;
+mod parse;
+mod reader;
+mod record;
+mod roles;
+mod sampling;
+mod source;
+#[cfg(test)]
+mod tests;
+mod writer;
+
+pub use atomic::write_file_atomically;
+pub use channel::Channel;
+pub use error::LogError;
+pub use reader::{
+    BLOCK_ROWS, Block, LogReader, LogSummary, check_same_channels, check_same_sampling,
+};
+pub use record::Log;
+pub use roles::{RoleNeed, Roles};
+pub use source::Source;
+pub use writer::{CsvWriter, write_table};

@@ -1,0 +1,341 @@
+//! Rows of text to columns of numbers.
+//!
+//! A row is first read as what nearly all rows are: bare numbers between separators, taken in one pass over the bytes.
+//! Whatever does not fit (quotes, an empty cell, a wrong count) is read again the careful way, which either
+//! understands it or says what is wrong with it.
+
+use std::ops::Range;
+
+use super::decimal;
+use super::error::{LogError, shorten};
+use super::header::Header;
+
+/// Words that stand for a value that is not there, beside the spellings of NaN and infinity.
+const MISSING: [&str; 7] = ["na", "n/a", "#n/a", "null", "none", "nil", "missing"];
+
+/// Parses rows into the slots that the wanted columns were given.
+#[derive(Debug)]
+pub(super) struct RowParser {
+    header: Header,
+    /// Slot of each column of the file; `None` for a column that is not wanted.
+    slots: Vec<Option<usize>>,
+    /// Column of the time stamps, when they are read.
+    time: Option<usize>,
+    /// Line of a blank line that was met: only blank lines may follow.
+    blank: Option<u64>,
+    fields: Vec<Range<usize>>,
+}
+
+/// How far [`RowParser::parse`] came.
+#[derive(Debug, Default)]
+pub(super) struct Progress {
+    pub(super) bytes: usize,
+    pub(super) lines: u64,
+    pub(super) rows: usize,
+}
+
+impl RowParser {
+    pub(super) fn new(header: Header, slots: Vec<Option<usize>>, time: Option<usize>) -> Self {
+        Self {
+            header,
+            slots,
+            time,
+            blank: None,
+            fields: Vec::new(),
+        }
+    }
+
+    pub(super) fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Parses lines of `text` (whole lines, the first being line `first_line` of the file) until the text or the
+    /// room in `columns` (rows `from..limit` of each slot) ends. `cut_off`: the file's last line had no line end.
+    pub(super) fn parse(
+        &mut self,
+        text: &[u8],
+        first_line: u64,
+        cut_off: bool,
+        columns: &mut [Vec<f64>],
+        rows: Range<usize>,
+    ) -> (Progress, Result<(), LogError>) {
+        let mut done = Progress::default();
+        while done.rows < rows.len() {
+            let Some(rest) = text.get(done.bytes..).filter(|rest| !rest.is_empty()) else {
+                break;
+            };
+            let row = rows.start + done.rows;
+            if self.blank.is_none() {
+                if let Some(used) = self.plain_row(rest, columns, row) {
+                    done.bytes += used;
+                    done.lines += 1;
+                    done.rows += 1;
+                    continue;
+                }
+            }
+            let end = memchr::memchr(b'\n', rest).unwrap_or(rest.len());
+            let line = rest.get(..end).unwrap_or_default();
+            let last = cut_off && end + 1 >= rest.len();
+            match self.careful_row(line, first_line + done.lines, last, columns, row) {
+                Ok(has_data) => done.rows += usize::from(has_data),
+                Err(error) => return (done, Err(error)),
+            }
+            done.bytes += end + 1;
+            done.lines += 1;
+        }
+        (done, Ok(()))
+    }
+
+    /// The quick way. `None` when the row is not made of bare numbers (and text in unwanted columns) or is wrong.
+    #[inline]
+    fn plain_row(&self, text: &[u8], columns: &mut [Vec<f64>], row: usize) -> Option<usize> {
+        let separator = self.header.separator;
+        let mut at = 0;
+        let last = self.slots.len() - 1;
+        for (column, slot) in self.slots.iter().enumerate() {
+            if let Some(slot) = slot {
+                while text.get(at) == Some(&b' ') {
+                    at += 1;
+                }
+                let (value, used) = decimal::read(text.get(at..)?)?;
+                at += used;
+                while text.get(at) == Some(&b' ') {
+                    at += 1;
+                }
+                *columns.get_mut(*slot)?.get_mut(row)? = value;
+            } else {
+                at += memchr::memchr3(separator, b'\n', b'"', text.get(at..)?)?;
+            }
+            let mut next = *text.get(at)?;
+            if column < last {
+                if next != separator {
+                    return None;
+                }
+            } else {
+                if next == b'\r' {
+                    at += 1;
+                    next = *text.get(at)?;
+                }
+                if next != b'\n' {
+                    return None;
+                }
+            }
+            at += 1;
+        }
+        Some(at)
+    }
+
+    /// The careful way: whether the line has data, or what is wrong with it.
+    fn careful_row(
+        &mut self,
+        line: &[u8],
+        number: u64,
+        cut_off: bool,
+        columns: &mut [Vec<f64>],
+        row: usize,
+    ) -> Result<bool, LogError> {
+        let name = || self.header.name.clone();
+        if line.trim_ascii().is_empty() {
+            // A tab alone may be two empty cells, but with nothing in them the row is as good as blank.
+            self.blank.get_or_insert(number);
+            return Ok(false);
+        }
+        if let Some(line) = self.blank {
+            return Err(LogError::BlankLine { name: name(), line });
+        }
+        if line.contains(&0) {
+            let hint =
+                "the line holds NUL bytes (a logger that lost power?); delete it and what follows";
+            return Err(LogError::NotText {
+                name: name(),
+                line: number,
+                hint,
+            });
+        }
+        split(line, self.header.separator, &mut self.fields);
+        let (expected, found) = (self.slots.len(), self.fields.len());
+        if expected != found {
+            let hint = self.ragged_hint(line, cut_off);
+            return Err(LogError::RaggedRow {
+                name: name(),
+                line: number,
+                expected,
+                found,
+                hint,
+            });
+        }
+        for (column, (slot, field)) in self.slots.iter().zip(&self.fields).enumerate() {
+            let Some(slot) = slot else { continue };
+            let cell = line.get(field.clone()).unwrap_or_default();
+            let Some(value) = finite(cell) else {
+                return Err(self.bad_cell(cell, number, column));
+            };
+            if let Some(place) = columns
+                .get_mut(*slot)
+                .and_then(|column| column.get_mut(row))
+            {
+                *place = value;
+            }
+        }
+        Ok(true)
+    }
+
+    fn ragged_hint(&self, line: &[u8], cut_off: bool) -> &'static str {
+        let (expected, found) = (self.slots.len(), self.fields.len());
+        if cut_off && found < expected {
+            "; the file ends in the middle of this line: delete it"
+        } else if self.header.separator == b',' && found == 2 * expected {
+            "; were decimals written with commas? Write decimal points, or separate the columns with semicolons"
+        } else if found == 1 && line.iter().any(|byte| b",;\t".contains(byte)) {
+            "; this row has another separator than the header: use one throughout"
+        } else if found < expected {
+            "; add what is missing (an interpolated value), or cut the log there"
+        } else {
+            "; remove what is too much (a stray separator?), or cut the log there"
+        }
+    }
+
+    fn bad_cell(&self, cell: &[u8], line: u64, index: usize) -> LogError {
+        let (name, column, text) = (
+            self.header.name.clone(),
+            self.header.column(index),
+            shorten(cell),
+        );
+        if cell.is_empty() {
+            return LogError::EmptyCell { name, line, column };
+        }
+        let word = text.to_ascii_lowercase();
+        // `1.#INF` and `-1.#IND` are what old C libraries print.
+        let not_finite =
+            fast_float2::parse::<f64, _>(cell.strip_prefix(b"+").unwrap_or(cell)).is_ok();
+        if not_finite
+            || MISSING.contains(&word.as_str())
+            || word.trim_start_matches('-').starts_with("1.#")
+        {
+            return LogError::NotFinite {
+                name,
+                line,
+                column,
+                text,
+            };
+        }
+        if self.time == Some(index) {
+            return LogError::TimeNotANumber {
+                name,
+                line,
+                column,
+                text,
+            };
+        }
+        let hint = if self
+            .header
+            .raw
+            .get(index)
+            .is_some_and(|header| header.as_bytes() == cell)
+        {
+            " but the header again (were files joined? Split them and pass both as two experiments)"
+        } else if finite(word.replacen(',', ".", 1).as_bytes()).is_some() {
+            " (a decimal comma? Write decimal points)"
+        } else if std::str::from_utf8(cell).is_err() {
+            " nor is it UTF-8 text"
+        } else {
+            ""
+        };
+        LogError::NotANumber {
+            name,
+            line,
+            column,
+            text,
+            hint,
+        }
+    }
+}
+
+/// The finite number that all of `cell` is, if it is one.
+pub(super) fn finite(cell: &[u8]) -> Option<f64> {
+    decimal::read(cell)
+        .filter(|(_, used)| *used == cell.len())
+        .map(|(value, _)| value)
+}
+
+/// Cuts a line at the separators outside quotes: `fields` gets the range of each field, without its quotes and the
+/// spaces around it.
+pub(super) fn split(line: &[u8], separator: u8, fields: &mut Vec<Range<usize>>) {
+    fields.clear();
+    let is_space = |byte: &u8| *byte == b' ' || (*byte == b'\t' && separator != b'\t');
+    let line = line.strip_suffix(b"\r").unwrap_or(line);
+    let mut at = 0;
+    loop {
+        let rest = line.get(at..).unwrap_or_default();
+        let padding = rest.iter().take_while(|byte| is_space(byte)).count();
+        let quoted = rest
+            .get(padding..)
+            .and_then(|rest| rest.strip_prefix(b"\""))
+            .and_then(closing_quote);
+        let search_from = quoted.map_or(0, |length| padding + length + 2);
+        let end = rest
+            .get(search_from..)
+            .and_then(|rest| memchr::memchr(separator, rest))
+            .map(|end| end + search_from);
+        let mut field = match quoted {
+            Some(length) => at + padding + 1..at + padding + 1 + length,
+            None => at + padding..at + end.unwrap_or(rest.len()).max(padding),
+        };
+        while line
+            .get(field.clone())
+            .and_then(<[u8]>::first)
+            .is_some_and(is_space)
+        {
+            field.start += 1;
+        }
+        while line
+            .get(field.clone())
+            .and_then(<[u8]>::last)
+            .is_some_and(is_space)
+        {
+            field.end -= 1;
+        }
+        fields.push(field);
+        match end {
+            Some(end) => at += end + 1,
+            None => return,
+        }
+    }
+}
+
+/// Length of what stands before the closing quote; a doubled quote does not close.
+fn closing_quote(text: &[u8]) -> Option<usize> {
+    let mut quotes = memchr::memchr_iter(b'"', text).peekable();
+    while let Some(at) = quotes.next() {
+        if quotes.next_if_eq(&(at + 1)).is_none() {
+            return Some(at);
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fields(line: &str, separator: u8) -> Vec<&str> {
+        let mut ranges = Vec::new();
+        split(line.as_bytes(), separator, &mut ranges);
+        ranges.into_iter().map(|range| &line[range]).collect()
+    }
+
+    #[test]
+    fn splits_quotes_spaces_and_empty_fields() {
+        assert_eq!(
+            fields("a, b ,,\"c,d\" , \" e \"\r", b','),
+            ["a", "b", "", "c,d", "e"]
+        );
+        assert_eq!(fields("", b','), [""]);
+        assert_eq!(fields(",", b','), ["", ""]);
+        assert_eq!(fields("  ", b','), [""]);
+        assert_eq!(fields(" \t1\t 2", b'\t'), ["", "1", "2"]);
+        assert_eq!(fields("\"open,1", b','), ["\"open", "1"]);
+        assert_eq!(fields("\"a \"\"b\"\"\",2", b','), ["a \"\"b\"\"", "2"]);
+        assert_eq!(fields("\"\",2", b','), ["", "2"]);
+    }
+}

@@ -1,0 +1,261 @@
+//! A whole recording in memory.
+
+use std::io::Read;
+use std::path::Path;
+
+use super::channel::Channel;
+use super::error::LogError;
+use super::reader::{Block, LogReader, check_same_channels, check_same_sampling};
+use super::roles::{RoleNeed, Roles};
+use super::source::Source;
+use super::writer::write_table;
+
+/// A recording: a uniform time base, named inputs u and named outputs y; a column a channel, N samples each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Log {
+    /// What messages call it: the file's name.
+    pub name: String,
+    /// Sample time in seconds.
+    pub sample_time: f64,
+    /// Time of the first sample in seconds.
+    pub start_time: f64,
+    /// Input channels, r of them.
+    pub inputs: Vec<Channel>,
+    /// Output channels, l of them.
+    pub outputs: Vec<Channel>,
+    /// `input_data[channel][sample]`, r columns of N.
+    pub input_data: Vec<Vec<f64>>,
+    /// `output_data[channel][sample]`, l columns of N.
+    pub output_data: Vec<Vec<f64>>,
+    /// SHA-256 (hexadecimal) of the file's raw bytes, when it came from a file.
+    pub sha256: Option<String>,
+}
+
+impl Log {
+    /// Reads a recording with at least one input and one output.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the file: see [`LogError`].
+    pub fn read(source: &Source, roles: &Roles) -> Result<Self, LogError> {
+        Self::read_with(source, roles, RoleNeed::Identify)
+    }
+
+    /// As [`Log::read`], with other roles needed.
+    ///
+    /// # Errors
+    /// As [`Log::read`].
+    pub fn read_with(source: &Source, roles: &Roles, need: RoleNeed) -> Result<Self, LogError> {
+        Self::collect(LogReader::open(source, roles, need)?)
+    }
+
+    /// As [`Log::read`], of bytes in memory; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As [`Log::read`].
+    pub fn from_reader(
+        name: &str,
+        reader: impl Read + Send + 'static,
+        roles: &Roles,
+    ) -> Result<Self, LogError> {
+        Self::collect(LogReader::from_reader(
+            name,
+            reader,
+            roles,
+            RoleNeed::Identify,
+        )?)
+    }
+
+    /// Reads all blocks that are left in `reader`, which should be at its start.
+    ///
+    /// # Errors
+    /// As [`LogReader::next_block`].
+    pub fn collect(mut reader: LogReader) -> Result<Self, LogError> {
+        let (inputs, outputs) = (reader.inputs().to_vec(), reader.outputs().to_vec());
+        let mut input_data = vec![Vec::new(); inputs.len()];
+        let mut output_data = vec![Vec::new(); outputs.len()];
+        let mut block = Block::new();
+        while reader.next_block(&mut block)? {
+            for (column, more) in input_data
+                .iter_mut()
+                .chain(&mut output_data)
+                .zip(&block.columns)
+            {
+                column.extend_from_slice(more);
+            }
+        }
+        let summary = reader.finish()?;
+        Ok(Self {
+            name: summary.name,
+            sample_time: summary.sample_time,
+            start_time: summary.start_time,
+            inputs,
+            outputs,
+            input_data,
+            output_data,
+            sha256: Some(summary.sha256),
+        })
+    }
+
+    /// A recording made of columns in memory; it starts at time 0. Either side may have no channels.
+    ///
+    /// # Errors
+    /// Columns that differ in length, that are not as many as the channels, or that hold NaN or infinities; no sample
+    /// at all; a sample time that is not positive.
+    pub fn from_columns(
+        name: &str,
+        sample_time: f64,
+        inputs: Vec<Channel>,
+        outputs: Vec<Channel>,
+        input_data: Vec<Vec<f64>>,
+        output_data: Vec<Vec<f64>>,
+    ) -> Result<Self, LogError> {
+        if !(sample_time.is_finite() && sample_time > 0.0) {
+            return Err(LogError::InvalidSampleTime { sample_time });
+        }
+        let name = name.to_owned();
+        for (role, channels, data) in [
+            ("input", &inputs, &input_data),
+            ("output", &outputs, &output_data),
+        ] {
+            let (expected, found) = (channels.len(), data.len());
+            if expected != found {
+                return Err(LogError::ColumnCount {
+                    name,
+                    role,
+                    expected,
+                    found,
+                });
+            }
+        }
+        let columns = || {
+            inputs
+                .iter()
+                .chain(&outputs)
+                .zip(input_data.iter().chain(&output_data))
+        };
+        let expected = columns().next().map_or(0, |(_, column)| column.len());
+        if expected == 0 {
+            return Err(LogError::too_short(&name, 0, 1, "a recording"));
+        }
+        for (channel, data) in columns() {
+            let (column, found) = (channel.to_string(), data.len());
+            if found != expected {
+                return Err(LogError::ColumnLength {
+                    name,
+                    column,
+                    expected,
+                    found,
+                });
+            }
+            if let Some((sample, value)) = data
+                .iter()
+                .enumerate()
+                .find(|(_, value)| !value.is_finite())
+            {
+                return Err(LogError::ColumnNotFinite {
+                    name,
+                    column,
+                    sample,
+                    value: *value,
+                });
+            }
+        }
+        Ok(Self {
+            name,
+            sample_time,
+            start_time: 0.0,
+            inputs,
+            outputs,
+            input_data,
+            output_data,
+            sha256: None,
+        })
+    }
+
+    /// Number of samples N.
+    pub fn samples(&self) -> usize {
+        self.input_data
+            .first()
+            .or(self.output_data.first())
+            .map_or(0, Vec::len)
+    }
+
+    /// The samples before `at` (from 0) and those from `at` on, such as one part to identify and one to validate with.
+    /// Both keep the file's hash; their names say which samples they are.
+    ///
+    /// # Errors
+    /// One part would be empty.
+    pub fn split_at(&self, at: usize) -> Result<(Self, Self), LogError> {
+        let samples = self.samples();
+        if at == 0 || at >= samples {
+            return Err(LogError::InvalidSplit {
+                name: self.name.clone(),
+                samples,
+                at,
+            });
+        }
+        let part = |from: usize, to: usize| {
+            let cut = |data: &[Vec<f64>]| {
+                data.iter()
+                    .map(|c| c.get(from..to).unwrap_or_default().to_vec())
+                    .collect()
+            };
+            Self {
+                name: format!("{} [samples {from} to {}]", self.name, to - 1),
+                start_time: self.start_time + from as f64 * self.sample_time,
+                sample_time: self.sample_time,
+                inputs: self.inputs.clone(),
+                outputs: self.outputs.clone(),
+                input_data: cut(&self.input_data),
+                output_data: cut(&self.output_data),
+                sha256: self.sha256.clone(),
+            }
+        };
+        Ok((part(0, at), part(at, samples)))
+    }
+
+    /// Whether `other` can be identified together with this recording: the same channels and units in the same order
+    /// and the same sample time to 0.1 %.
+    ///
+    /// # Errors
+    /// Says what differs, `other` being the one at fault.
+    pub fn check_same_kind(&self, other: &Self) -> Result<(), LogError> {
+        check_same_channels(
+            &self.name,
+            &self.inputs,
+            &other.name,
+            &other.inputs,
+            "inputs",
+        )?;
+        check_same_channels(
+            &self.name,
+            &self.outputs,
+            &other.name,
+            &other.outputs,
+            "outputs",
+        )?;
+        check_same_sampling(&self.name, self.sample_time, &other.name, other.sample_time)
+    }
+
+    /// Writes time, inputs and outputs as CSV to `path` (`-` is standard output, `.gz` compresses); the numbers are
+    /// read back exactly.
+    ///
+    /// # Errors
+    /// The file cannot be written; one that was there before stays as it was.
+    pub fn write_csv(&self, path: &Path) -> Result<(), LogError> {
+        let inputs = self
+            .inputs
+            .iter()
+            .zip(self.input_data.iter().map(Vec::as_slice));
+        let outputs = self
+            .outputs
+            .iter()
+            .zip(self.output_data.iter().map(Vec::as_slice));
+        write_table(
+            path,
+            self.sample_time,
+            self.start_time,
+            &inputs.chain(outputs).collect::<Vec<_>>(),
+        )
+    }
+}

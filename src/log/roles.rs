@@ -1,0 +1,369 @@
+//! Which column is an input, an output, the time.
+
+use super::channel::Channel;
+use super::error::LogError;
+use super::header::Header;
+
+/// What the user asked for: `--inputs`, `--outputs`, `--time`, `--dt`. The default leaves all to the headers.
+///
+/// A name matches a header with or without the unit in brackets (`force` finds `force [N]`), with the same case if it
+/// can be, in any case if only one column fits. What is not asked for goes by the header: u or U starts an input, y or
+/// Y an output, `t` or `time` is the time.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Roles {
+    /// Input columns, in the order wanted.
+    pub inputs: Option<Vec<String>>,
+    /// Output columns, in the order wanted.
+    pub outputs: Option<Vec<String>>,
+    /// The time column; seconds, unless the header says `[ms]`, `[us]`, `[ns]`, `[min]` or `[h]`.
+    pub time: Option<String>,
+    /// Sample time in seconds; when given, the time column is not read.
+    pub sample_time: Option<f64>,
+}
+
+impl Roles {
+    /// Inputs and outputs by name, as a model names them.
+    pub fn named(inputs: &[Channel], outputs: &[Channel]) -> Self {
+        let names = |channels: &[Channel]| Some(channels.iter().map(ToString::to_string).collect());
+        Self {
+            inputs: names(inputs),
+            outputs: names(outputs),
+            ..Self::default()
+        }
+    }
+}
+
+/// Which roles the caller cannot do without.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum RoleNeed {
+    /// Inputs and outputs, at least one of each.
+    #[default]
+    Identify,
+    /// Inputs; outputs are not read.
+    InputsOnly,
+    /// Outputs; inputs are not read (a simulation's answer).
+    OutputsOnly,
+    /// Inputs, and the outputs if the file has all of them: one that is missing means that none is read.
+    InputsAndMaybeOutputs,
+}
+
+/// Indices of the columns with a role.
+#[derive(Debug, PartialEq)]
+pub(super) struct Assigned {
+    pub(super) inputs: Vec<usize>,
+    pub(super) outputs: Vec<usize>,
+    pub(super) time: Option<usize>,
+}
+
+/// Finds the columns that `roles` and `need` ask for.
+pub(super) fn assign(roles: &Roles, need: RoleNeed, header: &Header) -> Result<Assigned, LogError> {
+    if let Some(sample_time) = roles
+        .sample_time
+        .filter(|dt| !(dt.is_finite() && *dt > 0.0))
+    {
+        return Err(LogError::InvalidSampleTime { sample_time });
+    }
+    let asked_time = roles
+        .time
+        .as_deref()
+        .map(|asked| known(header, asked))
+        .transpose()?;
+    let wants_inputs = need != RoleNeed::OutputsOnly;
+    let wants_outputs = need != RoleNeed::InputsOnly;
+
+    let mut inputs = asked_columns(header, roles.inputs.as_deref(), wants_inputs)?;
+    let strict = need == RoleNeed::Identify || need == RoleNeed::OutputsOnly;
+    let mut outputs = asked_columns(header, roles.outputs.as_deref(), strict)?;
+    if need == RoleNeed::InputsAndMaybeOutputs {
+        let asked = roles.outputs.as_ref().map_or(0, Vec::len);
+        outputs = outputs.map(|found| {
+            if found.len() == asked {
+                found
+            } else {
+                Vec::new()
+            }
+        });
+    }
+    // Columns asked for in any role are not candidates for a default, even where that role is not read.
+    let taken: Vec<usize> = asked_time
+        .into_iter()
+        .chain(inputs.iter().flatten().copied())
+        .chain(outputs.iter().flatten().copied())
+        .collect();
+    let time = asked_time.or_else(|| default_time(header, &taken));
+    let free = |index: &usize| !taken.contains(index) && Some(*index) != time;
+    let starting_with = |letters: [char; 2]| -> Vec<usize> {
+        let starts = |index: &usize| {
+            header
+                .channels
+                .get(*index)
+                .is_some_and(|c| c.name.starts_with(letters))
+        };
+        (0..header.channels.len())
+            .filter(starts)
+            .filter(free)
+            .collect()
+    };
+    let inputs = if wants_inputs {
+        inputs.take().unwrap_or_else(|| starting_with(['u', 'U']))
+    } else {
+        Vec::new()
+    };
+    let outputs = if wants_outputs {
+        outputs.take().unwrap_or_else(|| starting_with(['y', 'Y']))
+    } else {
+        Vec::new()
+    };
+
+    let (no_inputs, no_outputs) = (inputs.is_empty(), outputs.is_empty());
+    match need {
+        RoleNeed::Identify if no_inputs && no_outputs => return Err(no_roles(header, time, need)),
+        RoleNeed::InputsOnly | RoleNeed::InputsAndMaybeOutputs
+            if no_inputs && roles.inputs.is_none() =>
+        {
+            return Err(no_roles(header, time, need));
+        }
+        RoleNeed::OutputsOnly if no_outputs && roles.outputs.is_none() => {
+            return Err(no_roles(header, time, need));
+        }
+        _ => {}
+    }
+    let (name, headers) = (header.name.clone(), header.list());
+    if wants_inputs && no_inputs {
+        return Err(LogError::NoInputs {
+            name,
+            headers,
+            example: "--inputs a,b".to_owned(),
+        });
+    }
+    if strict && no_outputs {
+        return Err(LogError::NoOutputs {
+            name,
+            headers,
+            example: "--outputs c".to_owned(),
+        });
+    }
+    if time.is_none() && roles.sample_time.is_none() {
+        return Err(LogError::NoTime { name, headers });
+    }
+    let assigned = Assigned {
+        inputs,
+        outputs,
+        time,
+    };
+    assigned.check_distinct(header)?;
+    Ok(assigned)
+}
+
+impl Assigned {
+    /// Refuses a column with two roles, and two columns with one name (a model could not tell them apart).
+    fn check_distinct(&self, header: &Header) -> Result<(), LogError> {
+        let role = |role: &'static str, columns: &[usize]| {
+            columns.iter().map(|c| (role, *c)).collect::<Vec<_>>()
+        };
+        let mut all = role("input", &self.inputs);
+        all.extend(role("output", &self.outputs));
+        all.extend(self.time.map(|column| ("time", column)));
+        for (k, (second, b)) in all.iter().enumerate() {
+            for (first, a) in all.iter().take(k) {
+                let (Some(one), Some(other)) = (header.channels.get(*a), header.channels.get(*b))
+                else {
+                    continue;
+                };
+                if a == b {
+                    let (name, column) = (header.name.clone(), one.to_string());
+                    return Err(LogError::ColumnGivenTwice {
+                        name,
+                        column,
+                        first,
+                        second,
+                    });
+                }
+                if one.name == other.name {
+                    return Err(header.duplicate(*a, *b));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The columns asked for; those not found are left out unless `strict`.
+fn asked_columns(
+    header: &Header,
+    asked: Option<&[String]>,
+    strict: bool,
+) -> Result<Option<Vec<usize>>, LogError> {
+    let Some(asked) = asked else { return Ok(None) };
+    let mut columns = Vec::with_capacity(asked.len());
+    for name in asked {
+        if strict {
+            columns.push(known(header, name)?);
+        } else {
+            columns.extend(find(header, name)?);
+        }
+    }
+    Ok(Some(columns))
+}
+
+/// The column called `asked`, or an error that lists the headers.
+fn known(header: &Header, asked: &str) -> Result<usize, LogError> {
+    find(header, asked)?.ok_or_else(|| {
+        let suggestion = if header.headerless {
+            " (the file has no header: columns go by number, from 1)".to_owned()
+        } else {
+            closest(header, asked)
+                .map(|header| format!(" (did you mean `{header}`?)"))
+                .unwrap_or_default()
+        };
+        let (name, column, headers) = (header.name.clone(), asked.to_owned(), header.list());
+        LogError::UnknownColumn {
+            name,
+            column,
+            suggestion,
+            headers,
+        }
+    })
+}
+
+/// The column that `asked` names, if there is one and only one.
+fn find(header: &Header, asked: &str) -> Result<Option<usize>, LogError> {
+    let asked = asked.trim();
+    let channel = Channel::parse(asked);
+    let passes: [&dyn Fn(&Channel) -> bool; 3] = [
+        &|candidate| *candidate == channel && (channel.unit.is_some() || candidate.unit.is_none()),
+        &|candidate| candidate.answers_to(&channel, false),
+        &|candidate| candidate.answers_to(&channel, true),
+    ];
+    for pass in passes {
+        let mut found = header
+            .channels
+            .iter()
+            .enumerate()
+            .filter(|(_, c)| !c.name.is_empty() && pass(c));
+        let Some((first, channel)) = found.next() else {
+            continue;
+        };
+        let Some((second, other)) = found.next() else {
+            return Ok(Some(first));
+        };
+        if channel == other {
+            return Err(header.duplicate(first, second));
+        }
+        let matches = [channel, other].into_iter().chain(found.map(|(_, c)| c));
+        let matches = matches
+            .map(|c| format!("`{c}`"))
+            .collect::<Vec<_>>()
+            .join(", ");
+        return Err(LogError::AmbiguousColumn {
+            name: header.name.clone(),
+            column: asked.to_owned(),
+            matches,
+        });
+    }
+    Ok(None)
+}
+
+/// `t`, else `time` in any case, else `T` (which is more often a temperature), with or without a unit.
+fn default_time(header: &Header, taken: &[usize]) -> Option<usize> {
+    if header.headerless {
+        return None;
+    }
+    let named = |fits: &dyn Fn(&str) -> bool| {
+        header
+            .channels
+            .iter()
+            .enumerate()
+            .position(|(index, c)| fits(&c.name) && !taken.contains(&index))
+    };
+    named(&|name| name == "t")
+        .or_else(|| named(&|name| name.eq_ignore_ascii_case("time")))
+        .or_else(|| named(&|name| name == "T"))
+}
+
+/// The error that shows what to type, made of the file's own headers: the last column as output, the rest as inputs.
+fn no_roles(header: &Header, time: Option<usize>, need: RoleNeed) -> LogError {
+    let quote = |text: &str| {
+        let plain = text
+            .chars()
+            .all(|c| c.is_alphanumeric() || "_-.,/".contains(c));
+        if plain {
+            text.to_owned()
+        } else {
+            format!("'{text}'")
+        }
+    };
+    let mut names: Vec<&str> = Vec::new();
+    for (index, channel) in header.channels.iter().enumerate() {
+        if Some(index) != time && !channel.name.is_empty() {
+            names.push(&channel.name);
+        }
+    }
+    let mut example = String::new();
+    if header.headerless && names.len() > 2 {
+        names.remove(0);
+        example.push_str("--time 1 ");
+    }
+    let (inputs, output) = match names.split_last() {
+        Some((last, rest)) if !rest.is_empty() => (rest.join(","), (*last).to_owned()),
+        _ => ("a,b".to_owned(), "c".to_owned()),
+    };
+    example.push_str(&match need {
+        RoleNeed::Identify => format!("--inputs {} --outputs {}", quote(&inputs), quote(&output)),
+        RoleNeed::OutputsOnly => format!("--outputs {}", quote(&output)),
+        RoleNeed::InputsOnly | RoleNeed::InputsAndMaybeOutputs => {
+            format!("--inputs {}", quote(&inputs))
+        }
+    });
+    LogError::NoRoles {
+        name: header.name.clone(),
+        headers: header.list(),
+        hint: header.hint(),
+        example,
+    }
+}
+
+/// The header nearest to `asked` by edit distance, if it is near enough to be a slip.
+fn closest<'a>(header: &'a Header, asked: &str) -> Option<&'a Channel> {
+    let asked = Channel::parse(asked).name.to_lowercase();
+    let allowed = (asked.chars().count() / 3).max(1);
+    let distances = header
+        .channels
+        .iter()
+        .filter(|c| !c.name.is_empty())
+        .map(|channel| {
+            let name = channel.name.to_lowercase();
+            let part = asked.len() > 2
+                && (name.contains(&asked) || (name.len() > 2 && asked.contains(&name)));
+            (
+                if part {
+                    1
+                } else {
+                    edit_distance(&asked, &name)
+                },
+                channel,
+            )
+        });
+    distances
+        .min_by_key(|(distance, _)| *distance)
+        .filter(|(distance, _)| *distance <= allowed)
+        .map(|(_, c)| c)
+}
+
+/// Levenshtein distance in characters.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, from) in a.chars().enumerate() {
+        let mut previous = i + 1;
+        let mut next = vec![previous];
+        for ((to, diagonal), above) in b.iter().zip(&row).zip(row.iter().skip(1)) {
+            previous = (diagonal + usize::from(from != *to))
+                .min(above + 1)
+                .min(previous + 1);
+            next.push(previous);
+        }
+        row = next;
+    }
+    row.last().copied().unwrap_or(0)
+}
