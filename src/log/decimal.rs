@@ -195,15 +195,15 @@ fn read_exponent(bytes: &[u8], mut at: usize) -> Option<(i64, usize)> {
 #[inline]
 fn scale(mantissa: u64, exponent: i64) -> Option<f64> {
     let size = usize::try_from(exponent.unsigned_abs()).ok()?;
-    if mantissa <= 1 << 53 {
-        if let Some(power) = EXACT_POWERS.get(size) {
-            let mantissa = mantissa as f64;
-            return Some(if exponent < 0 {
-                mantissa / power
-            } else {
-                mantissa * power
-            });
-        }
+    if mantissa <= 1 << 53
+        && let Some(power) = EXACT_POWERS.get(size)
+    {
+        let mantissa = mantissa as f64;
+        return Some(if exponent < 0 {
+            mantissa / power
+        } else {
+            mantissa * power
+        });
     }
     if mantissa == 0 {
         return Some(0.0);

@@ -76,6 +76,23 @@ impl Lines {
         self.line += lines;
     }
 
+    /// Reads compressed data to their end and says whether they are damaged; plain data cannot be.
+    pub(super) fn damage(&mut self) -> Option<LogError> {
+        while self.stream.is_gzip() && !self.ended {
+            self.end = 0;
+            match self.read() {
+                Ok(()) => {}
+                Err(error) => {
+                    self.ended = true;
+                    return Some(error);
+                }
+            }
+        }
+        self.start = self.end;
+        self.whole = self.end;
+        None
+    }
+
     fn refill(&mut self) -> Result<(), LogError> {
         self.buffer.copy_within(self.start..self.end, 0);
         self.end -= self.start;

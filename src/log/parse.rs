@@ -65,13 +65,13 @@ impl RowParser {
                 break;
             };
             let row = rows.start + done.rows;
-            if self.blank.is_none() {
-                if let Some(used) = self.plain_row(rest, columns, row) {
-                    done.bytes += used;
-                    done.lines += 1;
-                    done.rows += 1;
-                    continue;
-                }
+            if self.blank.is_none()
+                && let Some(used) = self.plain_row(rest, columns, row)
+            {
+                done.bytes += used;
+                done.lines += 1;
+                done.rows += 1;
+                continue;
             }
             let end = memchr::memchr(b'\n', rest).unwrap_or(rest.len());
             let line = rest.get(..end).unwrap_or_default();

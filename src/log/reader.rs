@@ -175,11 +175,12 @@ impl LogReader {
     /// A row that is not as it should be, or a time base that is not uniform; after an error, the reader is at its end.
     pub fn next_block(&mut self, block: &mut Block) -> Result<bool, LogError> {
         let result = self.fill(block);
-        if result.is_err() {
+        result.map_err(|error| {
             self.done = true;
             block.columns.iter_mut().for_each(Vec::clear);
-        }
-        result
+            // Damaged gzip data show as damaged rows before their checksum comes: tell the cause, not the symptom.
+            self.lines.damage().unwrap_or(error)
+        })
     }
 
     fn fill(&mut self, block: &mut Block) -> Result<bool, LogError> {

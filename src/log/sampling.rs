@@ -166,14 +166,15 @@ impl Sampling {
 
     /// Keeps every `stride`-th time stamp, and doubles the stride when there are too many.
     fn mark(&mut self, time: f64) {
-        if self.count % self.stride != 0 {
+        if !self.count.is_multiple_of(self.stride) {
             return;
         }
         if self.marks.len() == MARKS {
             self.stride *= 2;
             let stride = self.stride;
-            self.marks.retain(|(sample, _)| sample % stride == 0);
-            if self.count % stride != 0 {
+            self.marks
+                .retain(|(sample, _)| sample.is_multiple_of(stride));
+            if !self.count.is_multiple_of(stride) {
                 return;
             }
         }

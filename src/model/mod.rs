@@ -35,3 +35,4 @@ pub(crate) use poles::{INTEGRATOR_TOLERANCE, slowest_first};
 pub use predict::{Prediction, Predictor};
 pub use simulate::Simulator;
 pub use state_space::StateSpace;
+pub(crate) use zeros::zero_directions;

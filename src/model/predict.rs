@@ -74,8 +74,7 @@ impl Predictor {
         inputs: &[&[f64]],
         outputs: &[&[f64]],
     ) -> Result<Prediction, ModelError> {
-        let samples = common_length("outputs", outputs, self.outputs, None)?;
-        common_length("inputs", inputs, self.inputs, Some(samples))?;
+        let samples = self.check(inputs, outputs)?;
         let channels: Vec<&[f64]> = inputs.iter().chain(outputs).copied().collect();
         let mut predicted = vec![Vec::new(); self.outputs];
         self.recursion
@@ -89,6 +88,12 @@ impl Predictor {
             predicted,
             innovations,
         })
+    }
+
+    /// Number of samples, after a check that all the channels are there and of that length.
+    pub(super) fn check(&self, inputs: &[&[f64]], outputs: &[&[f64]]) -> Result<usize, ModelError> {
+        let samples = common_length("outputs", outputs, self.outputs, None)?;
+        common_length("inputs", inputs, self.inputs, Some(samples))
     }
 
     /// State at the sample that comes next (`n`).
@@ -152,8 +157,12 @@ mod tests {
         let (u, y1, y2) = (column(4), column(5), column(6));
         let whole = s.one_step(&[&u], &[&y1, &y2], None).unwrap();
         let mut predictor = Predictor::new(&s, None).unwrap();
-        let first = predictor.step(&[&u[..25]], &[&y1[..25], &y2[..25]]).unwrap();
-        let second = predictor.step(&[&u[25..]], &[&y1[25..], &y2[25..]]).unwrap();
+        let first = predictor
+            .step(&[&u[..25]], &[&y1[..25], &y2[..25]])
+            .unwrap();
+        let second = predictor
+            .step(&[&u[25..]], &[&y1[25..], &y2[25..]])
+            .unwrap();
         for o in 0..2 {
             let joined = [&first.innovations[o][..], &second.innovations[o][..]].concat();
             assert_eq!(whole.innovations[o], joined);

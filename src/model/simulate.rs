@@ -310,6 +310,9 @@ mod tests {
             Err(ModelError::Length { channel: 2, .. })
         ));
         assert!(s.simulate(&[&u, &u], Some(&dvector![1.0])).is_err());
-        assert!(s.simulate_with_noise(&[&u, &u], &[&u[..4], &u[..4]], None).is_err());
+        assert!(
+            s.simulate_with_noise(&[&u, &u], &[&u[..4], &u[..4]], None)
+                .is_err()
+        );
     }
 }

@@ -50,7 +50,13 @@ impl StateSpace {
         check_shape("B", &b, n, r, "it needs as many rows as A")?;
         check_shape("C", &c, l, n, "it needs as many columns as A")?;
         check_shape("D", &d, l, r, "it needs the rows of C and the columns of B")?;
-        check_shape("K", &k, n, l, "it needs the rows of A and a column per output")?;
+        check_shape(
+            "K",
+            &k,
+            n,
+            l,
+            "it needs the rows of A and a column per output",
+        )?;
         for (name, matrix) in [("A", &a), ("B", &b), ("C", &c), ("D", &d), ("K", &k)] {
             check_finite(name, matrix)?;
         }
@@ -234,7 +240,10 @@ mod tests {
             "B is 1 x 3, but must be 2 x 3: it needs as many rows as A"
         );
         let gain = StateSpace::new(s.a, s.b, s.c, s.d, dmatrix![1.0, 2.0], 0.1).unwrap_err();
-        assert!(gain.to_string().starts_with("K is 1 x 2, but must be 2 x 1"));
+        assert!(
+            gain.to_string()
+                .starts_with("K is 1 x 2, but must be 2 x 1")
+        );
     }
 
     #[test]
@@ -269,7 +278,9 @@ mod tests {
     #[test]
     fn display_shows_every_matrix() {
         let text = system().to_string();
-        assert!(text.starts_with("state-space model: order 2, 1 input, 1 output, sample time 0.1 s"));
+        assert!(
+            text.starts_with("state-space model: order 2, 1 input, 1 output, sample time 0.1 s")
+        );
         assert_eq!(text.lines().count(), 1 + 2 + 2 + 1 + 1 + 2);
     }
 }

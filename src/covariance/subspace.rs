@@ -1,0 +1,186 @@
+//! Asymptotic covariance of PBSID_opt, without any matrix as long as the record.
+//!
+//! The only random quantity is the error `M = E Z^+` of the vector ARX coefficients, whose covariance is
+//! `(Z Z')^-1 (x) Lambda`. To first order the system matrices follow it linearly,
+//!
+//! ```text
+//! [dA dB dK] = S T(M) zeta_next Phi^+ - A S T(M) Z Phi^+ + K M Z Phi^+
+//! [dC (dD)]  = -C S T(M) Z [xhat;(u)]^+ + M Z [xhat;(u)]^+
+//! ```
+//!
+//! with `T(M)` the block upper triangular arrangement (26). This is van Wingerden (35)-(41) and
+//! Appendices B, C written for `M`. The terms in `K M` and `M` are the paper's beta terms with a **plus**:
+//! the residual is `Ehat = E - E Pi_Z`, so its error is `-E Pi_Z`; the printed minus in (B.2) and (B.4) is
+//! wrong, which a test shows.
+
+use nalgebra::DMatrix;
+
+use super::parameters::{ParameterCovariance, ParameterLayout};
+use crate::identify::{Estimate, Varx};
+use crate::linalg::{
+    LinalgError, multiply, multiply_nt, pseudo_inverse, solve_upper_right,
+    symmetric_square_root_factor,
+};
+
+/// Jacobian of `theta` with respect to `vec M`, entry `(parameter, o + l j)` for `M[o, j]`.
+pub fn subspace_jacobian(estimate: &Estimate, varx: &Varx) -> (ParameterLayout, DMatrix<f64>) {
+    let system = &estimate.system;
+    let (n, inputs, outputs) = (system.states(), system.inputs(), system.outputs());
+    let q = inputs + outputs;
+    let layout = ParameterLayout {
+        states: n,
+        inputs,
+        outputs,
+        feedthrough: varx.feedthrough,
+    };
+    let regressors = varx.regressors();
+    let mut jacobian = DMatrix::zeros(layout.len(), outputs * regressors);
+
+    // The state equation: parameters vec [A B K], index a + n c.
+    let zeta = &estimate.state_regression;
+    let width = varx.past * q;
+    let current = zeta.rows(0, width).into_owned();
+    let next = zeta.rows(q, width).into_owned();
+    let map = &estimate.state_map;
+    let minus_a_map = -multiply(&system.a, map);
+    add_shifted(&mut jacobian, n, 0, outputs, q, map, &next);
+    add_shifted(&mut jacobian, n, 0, outputs, q, &minus_a_map, &current);
+    add_direct(
+        &mut jacobian,
+        n,
+        0,
+        outputs,
+        &system.k,
+        &zeta.rows(0, regressors).into_owned(),
+    );
+
+    // The output equation: parameters vec [C (D)], index a + l c.
+    let zeta = &estimate.output_regression;
+    let minus_c_map = -multiply(&system.c, map);
+    let current = zeta.rows(0, width).into_owned();
+    let first = layout.c();
+    add_shifted(
+        &mut jacobian,
+        outputs,
+        first,
+        outputs,
+        q,
+        &minus_c_map,
+        &current,
+    );
+    let identity = DMatrix::identity(outputs, outputs);
+    add_direct(
+        &mut jacobian,
+        outputs,
+        first,
+        outputs,
+        &identity,
+        &zeta.rows(0, regressors).into_owned(),
+    );
+    (layout, jacobian)
+}
+
+/// Adds the derivative of `L T(M) G` with respect to `M`, `L = [L_1 .. L_f]` (`rows x f l`), `G` (`p q x m`):
+/// `sum_i L_i[a, o] G[i q + j, c]` for parameter `(a, c)` and coefficient `(o, j)`.
+///
+/// The sum over the block rows `i` is one matrix product per column `c`.
+fn add_shifted(
+    jacobian: &mut DMatrix<f64>,
+    rows: usize,
+    first: usize,
+    outputs: usize,
+    channels: usize,
+    left: &DMatrix<f64>,
+    right: &DMatrix<f64>,
+) {
+    let future = left.ncols() / outputs;
+    let width = right.nrows();
+    // (a, o) x i.
+    let stacked = DMatrix::from_fn(rows * outputs, future, |ao, i| {
+        left[(ao % rows, i * outputs + ao / rows)]
+    });
+    for c in 0..right.ncols() {
+        // i x j: row i is the column of G, moved up by i blocks.
+        let hankel = DMatrix::from_fn(future, width, |i, j| {
+            let row = i * channels + j;
+            if row < width { right[(row, c)] } else { 0.0 }
+        });
+        let product = multiply(&stacked, &hankel);
+        for j in 0..width {
+            for o in 0..outputs {
+                for a in 0..rows {
+                    jacobian[(first + a + rows * c, o + outputs * j)] += product[(a + rows * o, j)];
+                }
+            }
+        }
+    }
+}
+
+/// Adds the derivative of `L M G` with respect to `M`: `L[a, o] G[j, c]`.
+fn add_direct(
+    jacobian: &mut DMatrix<f64>,
+    rows: usize,
+    first: usize,
+    outputs: usize,
+    left: &DMatrix<f64>,
+    right: &DMatrix<f64>,
+) {
+    for c in 0..right.ncols() {
+        for j in 0..right.nrows() {
+            for o in 0..outputs {
+                for a in 0..rows {
+                    jacobian[(first + a + rows * c, o + outputs * j)] +=
+                        left[(a, o)] * right[(j, c)];
+                }
+            }
+        }
+    }
+}
+
+/// Covariance of the system matrices, in scaled units and in the basis of the estimate.
+///
+/// # Errors
+/// [`LinalgError`] when the innovation covariance cannot be decomposed.
+pub fn subspace_covariance(
+    estimate: &Estimate,
+    varx: &Varx,
+) -> Result<ParameterCovariance, LinalgError> {
+    let (layout, jacobian) = subspace_jacobian(estimate, varx);
+    let outputs = layout.outputs;
+    let regressors = varx.regressors();
+    let parameters = layout.len();
+    // Whiten: J (R_z^-1 over j, chol(Lambda) over o), so that the covariance is a product with its
+    // transpose, positive semidefinite by construction.
+    let noise = symmetric_square_root_factor(&varx.innovation_covariance)?;
+    let inverse = if varx.dependent {
+        Some(pseudo_inverse(&varx.regressor_factor, 1e-12)?)
+    } else {
+        None
+    };
+    let mut covariance = DMatrix::zeros(parameters, parameters);
+    for direction in 0..outputs {
+        let mut mixed = DMatrix::zeros(parameters, regressors);
+        for j in 0..regressors {
+            let mut column = mixed.column_mut(j);
+            for o in 0..outputs {
+                column.axpy(
+                    noise[(o, direction)],
+                    &jacobian.column(o + outputs * j),
+                    1.0,
+                );
+            }
+        }
+        let whitened = match &inverse {
+            Some(inverse) => multiply(&mixed, inverse),
+            None => solve_upper_right(&mixed, &varx.regressor_factor),
+        };
+        covariance += multiply_nt(&whitened, &whitened);
+    }
+    // Exactly symmetric, whatever the order of summation.
+    let covariance = (&covariance + covariance.transpose()) * 0.5;
+    Ok(ParameterCovariance {
+        layout,
+        matrix: covariance,
+        degrees_of_freedom: None,
+    })
+}

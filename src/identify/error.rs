@@ -1,0 +1,112 @@
+//! Why a model could not be identified, and what to do about it.
+
+use crate::linalg::LinalgError;
+use crate::log::LogError;
+
+/// Failure of an identification.
+#[derive(Debug, thiserror::Error)]
+pub enum IdentifyError {
+    /// The recording could not be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A factorisation failed on data that should allow it.
+    #[error("numerical failure: {0}")]
+    Linalg(#[from] LinalgError),
+    /// Not enough samples for the past window.
+    #[error(
+        "the recording is too short: {samples} samples, but a past window of {past} needs at least {needed}; \
+         give a longer recording or a smaller --past"
+    )]
+    TooShort {
+        /// Samples there are.
+        samples: usize,
+        /// Past window asked for.
+        past: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+    /// Not enough samples for any model.
+    #[error(
+        "the recording is too short: {samples} samples in all, and a model of {channels} channels needs at \
+         least {needed}; give a longer recording, or more of them"
+    )]
+    TooFewSamples {
+        /// Samples there are.
+        samples: usize,
+        /// Number of channels.
+        channels: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+    /// A channel that never changes.
+    #[error(
+        "{role} '{name}' is constant{place}: it carries no information; leave it out with --inputs and --outputs"
+    )]
+    ConstantChannel {
+        /// `input` or `output`.
+        role: &'static str,
+        /// Name of the channel.
+        name: String,
+        /// Where, when there are several experiments.
+        place: String,
+    },
+    /// Two channels that are the same signal up to scale and offset.
+    #[error(
+        "'{first}' and '{second}' are the same signal up to scale and offset (correlation {correlation:.12}); \
+         a model between them says nothing: leave one out with --inputs and --outputs"
+    )]
+    SameChannel {
+        /// Name of the one channel.
+        first: String,
+        /// Name of the other.
+        second: String,
+        /// Correlation coefficient.
+        correlation: f64,
+    },
+    /// Order beyond what the windows allow.
+    #[error(
+        "order {order} is not possible: {reason}; the largest order here is {largest} \
+         (raise --future or --past for more)"
+    )]
+    Order {
+        /// Order asked for.
+        order: usize,
+        /// Largest possible.
+        largest: usize,
+        /// What limits it.
+        reason: String,
+    },
+    /// Windows that make no sense.
+    #[error("--past {past} --future {future} is not possible: {reason}")]
+    Horizon {
+        /// Past window.
+        past: usize,
+        /// Future window.
+        future: usize,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The states, inputs and residuals are linearly dependent.
+    #[error(
+        "the regression on {what} is singular: the recording does not excite the plant enough for this order; \
+         lower --order or --past, or record with a richer input"
+    )]
+    SingularRegression {
+        /// Which regressors.
+        what: &'static str,
+    },
+    /// Options that do not fit the recording.
+    #[error("{0}")]
+    Option(String),
+    /// No stable model was found.
+    #[error(
+        "no stable model of order {order} was found (spectral radius stays at {spectral_radius:.6}); \
+         lower --order or drop --stable"
+    )]
+    NoStableModel {
+        /// Order.
+        order: usize,
+        /// Radius of the best try.
+        spectral_radius: f64,
+    },
+}

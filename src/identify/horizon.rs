@@ -1,0 +1,95 @@
+//! Choice of the past and future windows.
+
+use nalgebra::DMatrix;
+
+use crate::linalg::{cholesky_upper, qr_r};
+use crate::moments::RFactor;
+
+/// Share of the samples that regressors may take when the past window is chosen: `p q <= Nc / 10` keeps
+/// the second-order part of the variance below a tenth.
+const SAMPLES_PER_REGRESSOR: usize = 10;
+/// Longest past window that is tried first; longer ones only when the truncation asks for them.
+pub const LONGEST_PAST: usize = 100;
+/// Longest past window that is chosen at all.
+pub const LONGEST_PAST_ON_DEMAND: usize = 250;
+/// A future window shorter than this loses efficiency, a longer one only adds variance.
+const SHORTEST_FUTURE: usize = 10;
+
+/// Longest past window for a record of `samples` samples of `channels` channels.
+pub fn longest_past(samples: usize, channels: usize, limit: usize) -> usize {
+    (samples / (SAMPLES_PER_REGRESSOR * channels + 1)).clamp(1, limit)
+}
+
+/// Akaike's criterion (corrected for small samples: Hurvich & Tsai 1989, Bedrick & Tsai 1994) of the
+/// vector ARX model for every past window up to that of `factor`, all over the same windows.
+///
+/// One triangular factor with the newest block first holds them all: the residual of past window `p'` is
+/// what the outputs have below row `p' q`.
+pub fn akaike(factor: &RFactor, feedthrough: bool) -> Vec<(usize, f64)> {
+    let (q, outputs) = (factor.channels(), factor.outputs);
+    let past = factor.past;
+    let order = factor.r.ncols();
+    let direct = if feedthrough { factor.inputs } else { 0 };
+    let mut columns: Vec<usize> = (past * q..past * q + direct).collect();
+    for block in (0..past).rev() {
+        columns.extend(block * q..(block + 1) * q);
+    }
+    columns.extend(order - outputs..order);
+    let reversed = DMatrix::from_fn(order, columns.len(), |i, j| factor.r[(i, columns[j])]);
+    let r = qr_r(&reversed);
+    let first_output = columns.len() - outputs;
+    let samples = factor.columns as f64;
+    // Rounding of the factor is noise that no record is free of.
+    let floor: Vec<f64> = (0..outputs)
+        .map(|o| {
+            let column = r.column(first_output + o);
+            column.norm_squared() * 1e-24
+        })
+        .collect();
+    let mut sum = DMatrix::zeros(outputs, outputs);
+    let mut out = Vec::with_capacity(past);
+    let mut row = r.nrows();
+    for window in (1..=past).rev() {
+        let regressors = direct + window * q;
+        while row > regressors {
+            row -= 1;
+            let line = r.view((row, first_output), (1, outputs));
+            sum += line.transpose() * line;
+        }
+        let mut padded = sum.clone();
+        for (o, floor) in floor.iter().enumerate() {
+            padded[(o, o)] += floor;
+        }
+        let log_determinant = cholesky_upper(&(padded / samples))
+            .map(|u| 2.0 * u.diagonal().iter().map(|d| d.ln()).sum::<f64>())
+            .unwrap_or(f64::NEG_INFINITY);
+        let m = regressors as f64;
+        let l = outputs as f64;
+        let spare = samples - m - l - 1.0;
+        if spare > 0.0 {
+            let penalty = 2.0 * l * m * samples / spare;
+            out.push((window, samples * log_determinant + penalty));
+        }
+    }
+    out.reverse();
+    out
+}
+
+/// The window with the smallest criterion.
+pub fn best_past(criterion: &[(usize, f64)]) -> Option<usize> {
+    criterion
+        .iter()
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(past, _)| *past)
+}
+
+/// Future window for the order decision: enough for every order that is looked at.
+pub fn future_for_order_choice(past: usize, outputs: usize, largest_order: usize) -> usize {
+    past.min((largest_order / outputs + 2).max(SHORTEST_FUTURE))
+}
+
+/// Future window for an order: `f >= n / l + 1`, at least twice that for efficiency, and not longer than
+/// it needs to be (`f` much beyond that adds variance).
+pub fn future_for_order(past: usize, outputs: usize, order: usize) -> usize {
+    past.min((2 * (order.div_ceil(outputs) + 1)).max(SHORTEST_FUTURE))
+}

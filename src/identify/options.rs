@@ -1,0 +1,74 @@
+//! What the user may choose.
+
+use serde::{Deserialize, Serialize};
+
+use super::pbsid_opt::Weight;
+use crate::moments::Detrend;
+
+/// Which state dimension.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Order {
+    /// By singular values, with the chi-square test as referee.
+    #[default]
+    Auto,
+    /// This one.
+    Fixed(usize),
+    /// The best of these, all of them compared in the result.
+    Compare(Vec<usize>),
+}
+
+/// When the estimate is polished to maximum likelihood.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum Polish {
+    /// When the past window is long enough for it (the truncation measure says so).
+    #[default]
+    Auto,
+    /// Whatever the truncation.
+    Always,
+    /// Not at all: plain PBSID_opt with its own covariance.
+    Never,
+}
+
+/// Which covariance of the parameters.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum CovarianceKind {
+    /// From the model: valid when order and noise model are right.
+    #[default]
+    Model,
+    /// Delete-block jackknife: valid also when they are not, about the best model of that order.
+    Robust,
+}
+
+/// Options of [`identify`](super::identify()); the default is what the command line does without flags.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Options {
+    /// State dimension.
+    pub order: Order,
+    /// Past window `p`; `None` chooses.
+    pub past: Option<usize>,
+    /// Future window `f <= p`; `None` chooses.
+    pub future: Option<usize>,
+    /// Weight of the singular value decomposition; `None` is the identity, unless the innovations of
+    /// the outputs differ so much in size that their units would decide.
+    pub weight: Option<Weight>,
+    /// Maximum-likelihood polish.
+    pub polish: Polish,
+    /// Kind of covariance.
+    pub covariance: CovarianceKind,
+    /// What is removed from the channels.
+    pub detrend: Detrend,
+    /// Whether `D` is estimated. In closed loop it is only identifiable with a delay in the loop.
+    pub feedthrough: bool,
+    /// Known delay of each input in samples; empty is none, one value is for all inputs.
+    pub input_delay: Vec<usize>,
+    /// Whether the model must be stable.
+    pub stable: bool,
+    /// Seed of everything drawn (confidence bounds by draws).
+    pub seed: u64,
+}

@@ -1,0 +1,60 @@
+//! A stable model, guaranteed, and what it costs.
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+
+use super::polish::{Polished, polish};
+use super::varx::Varx;
+use crate::linalg::{LinalgError, eigen};
+use crate::model::StateSpace;
+
+/// Largest spectral radius that counts as stable for a record of `columns` windows: a time constant as
+/// long as the record. Slower decay cannot be told from an integrator by these data.
+pub fn largest_stable_radius(columns: usize) -> f64 {
+    (-1.0 / columns.max(10) as f64).exp()
+}
+
+/// The system with every eigenvalue of `A` beyond `radius` moved onto it along its ray; the eigenvectors,
+/// and with them the other matrices, stay.
+///
+/// # Errors
+/// [`LinalgError`] when `A` is defective.
+pub fn with_poles_inside(system: &StateSpace, radius: f64) -> Result<StateSpace, LinalgError> {
+    let decomposition = eigen(&system.a)?;
+    let n = system.states();
+    let moved: Vec<Complex64> = decomposition
+        .values
+        .iter()
+        .map(|value| {
+            if value.norm() > radius {
+                value * (radius / value.norm())
+            } else {
+                *value
+            }
+        })
+        .collect();
+    let diagonal = DMatrix::from_fn(n, n, |i, j| {
+        if i == j {
+            moved[i]
+        } else {
+            Complex64::default()
+        }
+    });
+    let a = &decomposition.right * diagonal * &decomposition.left;
+    Ok(StateSpace {
+        a: a.map(|v| v.re),
+        ..system.clone()
+    })
+}
+
+/// The best model found whose poles are inside the stability radius: the poles are moved in, then all
+/// parameters are polished again under the constraint.
+///
+/// # Errors
+/// [`LinalgError`] from the polish, or for a defective `A`.
+pub fn stabilised(start: &StateSpace, varx: &Varx) -> Result<Polished, LinalgError> {
+    let radius = largest_stable_radius(varx.columns);
+    // A little inside, so that rounding and the first steps stay within.
+    let inside = with_poles_inside(start, 1.0 - 1.5 * (1.0 - radius))?;
+    polish(&inside, varx, Some(radius))
+}

@@ -1,0 +1,96 @@
+//! What a user should know before trusting a model, in plain words.
+
+use super::options::{Options, Polish};
+use super::order::REFEREE_LEVEL;
+use super::summary::Summary;
+use super::truncation::LARGEST_FOR_POLISH;
+use super::varx::Varx;
+use crate::moments::Route;
+
+/// Truncation that PBSID_opt itself no longer tolerates.
+const LARGEST_FOR_SUBSPACE: f64 = 100.0;
+/// Samples per regressor below which the asymptotic formulas are optimistic: their relative error in the
+/// variance is about `p q / Nc`.
+const SAMPLES_PER_REGRESSOR: f64 = 5.0;
+/// Reciprocal condition below which some combination of past signals is hardly excited.
+const POOR_EXCITATION: f64 = 1e-6;
+
+/// Warnings that follow from the fit alone.
+pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Options) -> Vec<String> {
+    let mut out = Vec::new();
+    if noise_free {
+        out.push(
+            "the recording is noise-free to rounding: the model is exact, and its uncertainty of no meaning"
+                .to_owned(),
+        );
+    }
+    if summary.spectral_radius >= 1.0 {
+        out.push(format!(
+            "the model is unstable or integrating (spectral radius {:.6}): a free run may drift away; --stable asks for \
+             a stable one",
+            summary.spectral_radius
+        ));
+    }
+    if let Some(test) = &summary.order_test
+        && let Some(p) = test.p_value
+        && p < REFEREE_LEVEL
+    {
+        out.push(format!(
+            "a linear model of order {} does not explain the recording (chi-square {:.0} with {} degrees of freedom, \
+             p = {p:.1e}): the order is too low, or the plant is not linear; the covariance is optimistic, \
+             --covariance robust is not",
+            summary.order, test.chi_square, test.degrees_of_freedom
+        ));
+    }
+    match summary.truncation {
+        Some(eta) if eta > LARGEST_FOR_SUBSPACE => out.push(format!(
+            "the past window of {} is too short for the noise dynamics (truncation {eta:.0}): estimates are biased; \
+             raise --past",
+            summary.past
+        )),
+        Some(eta) if eta > LARGEST_FOR_POLISH && options.polish == Polish::Auto => out.push(format!(
+            "not polished to maximum likelihood, because the past window of {} cuts off too much (truncation \
+             {eta:.1}, at most {LARGEST_FOR_POLISH}): raise --past",
+            summary.past
+        )),
+        None if !noise_free => out.push(
+            "what the past window cuts off could not be measured: the predictor of the model is not stable".to_owned(),
+        ),
+        _ => {}
+    }
+    let regressors = varx.regressors() as f64;
+    if (varx.columns as f64) < SAMPLES_PER_REGRESSOR * regressors && !noise_free {
+        out.push(format!(
+            "short recording: {} windows for {} regressors; the uncertainty is understated by about {:.0} %",
+            varx.columns,
+            varx.regressors(),
+            100.0 * regressors / varx.columns as f64
+        ));
+    }
+    if varx.dependent {
+        out.push(
+            "the past signals are linearly dependent: the input does not excite the plant richly enough for this past \
+             window, or one channel is computed from the others"
+                .to_owned(),
+        );
+    } else if summary.route == Route::PanelQr && summary.reciprocal_condition < POOR_EXCITATION {
+        out.push(format!(
+            "poor excitation: some combinations of the past signals hardly occur (reciprocal condition {:.1e}), so \
+             parts of the model rest on little information; their uncertainty says so",
+            summary.reciprocal_condition
+        ));
+    }
+    if let Some(stability) = &summary.stability {
+        out.push(match stability.p_value {
+            Some(p) if p < REFEREE_LEVEL => format!(
+                "the recording speaks against a stable model (chi-square rises by {:.1}, p = {p:.1e})",
+                stability.chi_square_increase
+            ),
+            _ => format!(
+                "made stable at no significant cost (chi-square rises by {:.2})",
+                stability.chi_square_increase
+            ),
+        });
+    }
+    out
+}
