@@ -6,3 +6,5 @@ pub mod log;
 pub mod model;
 pub mod moments;
 pub mod systems;
+
+pub use identify::{IdentifyError, Model, Options, identify};

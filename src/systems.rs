@@ -150,9 +150,15 @@ pub fn servo() -> TestSystem {
             3,
             3,
             &[
-                slow + p, -(q + slow * p), slow * q, //
-                1.0, 0.0, 0.0, //
-                0.0, 1.0, 0.0,
+                slow + p,
+                -(q + slow * p),
+                slow * q, //
+                1.0,
+                0.0,
+                0.0, //
+                0.0,
+                1.0,
+                0.0,
             ],
         ),
         b: DMatrix::from_row_slice(3, 1, &[1.0, 0.0, 0.0]),
@@ -171,11 +177,7 @@ pub fn servo() -> TestSystem {
 /// A two-by-two plant with slow coupled dynamics sampled every 2 s, correlated noise, open loop.
 pub fn two_by_two() -> TestSystem {
     let system = StateSpace {
-        a: DMatrix::from_row_slice(
-            3,
-            3,
-            &[0.92, 0.05, 0.0, -0.04, 0.85, 0.1, 0.0, -0.06, 0.7],
-        ),
+        a: DMatrix::from_row_slice(3, 3, &[0.92, 0.05, 0.0, -0.04, 0.85, 0.1, 0.0, -0.06, 0.7]),
         b: DMatrix::from_row_slice(3, 2, &[0.5, 0.0, 0.1, 0.6, 0.0, -0.4]),
         c: DMatrix::from_row_slice(2, 3, &[1.0, 0.2, 0.0, 0.0, 0.8, -0.5]),
         d: DMatrix::zeros(2, 2),

@@ -13,7 +13,9 @@ use super::polish::{coefficient_cost, polish};
 use super::records::Records;
 use super::scaling;
 use super::stable::{largest_stable_radius, stabilised, with_poles_inside};
-use super::summary::{OrderTest, PastEvidence, StabilityCost, Summary};
+use super::summary::{
+    Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
+};
 use super::truncation::{LARGEST_FOR_POLISH, past_for_truncation};
 use super::varx::{Varx, varx};
 use super::warnings;
@@ -34,6 +36,9 @@ const TRUNCATION_TARGET: f64 = 0.1;
 const LARGEST_UNIT_RATIO: f64 = 3.0;
 /// Relative innovation variance below which a record is noise-free to rounding.
 const NOISE_FREE: f64 = 1e-16;
+
+/// Singular values that are reported.
+const SINGULAR_VALUES_KEPT: usize = 40;
 
 /// A fitted model in the user's units.
 #[derive(Debug)]
@@ -609,38 +614,46 @@ fn finish(
         method: "pbsid-opt".to_owned(),
         weight,
         polished: polished.is_some(),
-        polish: options.polish,
-        covariance_kind: options.covariance,
-        past: factor.past,
-        future,
         order,
-        order_chosen: !matches!(options.order, Order::Fixed(_)),
-        past_chosen: options.past.is_none(),
-        explanation,
-        detrend: options.detrend,
+        horizons: Horizons {
+            past: factor.past,
+            future,
+        },
         samples: data.samples,
-        columns: varx.columns,
         degrees_of_freedom: varx.degrees_of_freedom(),
-        route: factor.route,
-        reciprocal_condition: factor.reciprocal_condition,
-        truncation: candidate
-            .truncation
-            .is_finite()
-            .then_some(candidate.truncation),
-        singular_values: decomposition
-            .singular_values
-            .iter()
-            .take(40.max(order + 5))
-            .copied()
-            .collect(),
-        order_test,
-        orders: evidence,
-        past_windows,
-        spectral_radius: spectral_radius(&system.a)?,
-        predictor_radius: spectral_radius(&(&system.a - &system.k * &system.c))?,
-        stability,
-        jackknife_blocks,
-        recordings: records.recordings(),
+        options: Asked {
+            order_automatic: !matches!(options.order, Order::Fixed(_)),
+            past_automatic: options.past.is_none(),
+            polish: options.polish,
+            covariance: options.covariance,
+            detrend: options.detrend,
+            feedthrough: options.feedthrough,
+            stable: options.stable,
+            seed: options.seed,
+        },
+        diagnostics: Diagnostics {
+            windows: varx.columns,
+            route: factor.route,
+            reciprocal_condition: factor.reciprocal_condition,
+            truncation: candidate
+                .truncation
+                .is_finite()
+                .then_some(candidate.truncation),
+            singular_values: decomposition
+                .singular_values
+                .iter()
+                .take(SINGULAR_VALUES_KEPT.max(order + 5))
+                .copied()
+                .collect(),
+            spectral_radius: spectral_radius(&system.a)?,
+            predictor_radius: spectral_radius(&(&system.a - &system.k * &system.c))?,
+            order_test,
+            orders: evidence,
+            past_windows,
+            stability,
+            jackknife_blocks,
+        },
+        explanation,
         warnings: Vec::new(),
     };
     summary.warnings = warnings::of_fit(&summary, &varx, noise_free, options);

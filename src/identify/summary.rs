@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 use super::options::{CovarianceKind, Polish};
 use super::order::OrderEvidence;
 use super::pbsid_opt::Weight;
-use super::records::Recording;
 use crate::moments::{Detrend, Route};
 
 /// Akaike's criterion of one past window.
@@ -41,48 +40,54 @@ pub struct StabilityCost {
     pub p_value: Option<f64>,
 }
 
-/// How the model came about.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct Summary {
-    /// Algorithm.
-    pub method: String,
-    /// Weight of the singular value decomposition.
-    pub weight: Weight,
-    /// Whether the final numbers are those of the polish.
-    pub polished: bool,
-    /// What was asked.
-    pub polish: Polish,
-    /// Kind of covariance.
-    pub covariance_kind: CovarianceKind,
+/// Windows of the subspace step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Horizons {
     /// Past window `p`.
     pub past: usize,
     /// Future window `f`.
     pub future: usize,
-    /// Order `n`.
-    pub order: usize,
-    /// Whether the order was chosen here.
-    pub order_chosen: bool,
-    /// Whether the past window was chosen here.
-    pub past_chosen: bool,
-    /// One sentence each on how order and windows were chosen.
-    pub explanation: Vec<String>,
+}
+
+/// What was asked for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Asked {
+    /// Whether the order was chosen by the program.
+    pub order_automatic: bool,
+    /// Whether the past window was chosen by the program.
+    pub past_automatic: bool,
+    /// Maximum-likelihood polish.
+    pub polish: Polish,
+    /// Kind of covariance.
+    pub covariance: CovarianceKind,
     /// What was removed from the channels.
     pub detrend: Detrend,
-    /// Samples of all experiments (after alignment of known delays).
-    pub samples: usize,
+    /// Whether `D` was estimated.
+    pub feedthrough: bool,
+    /// Whether a stable model was asked for.
+    pub stable: bool,
+    /// Seed of everything drawn.
+    pub seed: u64,
+}
+
+/// Numbers that tell how far to trust the model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Diagnostics {
     /// Windows in the regression, `Nc`.
-    pub columns: usize,
-    /// Degrees of freedom of the innovation covariance, for each output.
-    pub degrees_of_freedom: usize,
+    pub windows: usize,
     /// Route of the factorisation.
     pub route: Route,
-    /// Reciprocal condition of the data factor.
+    /// Reciprocal condition of the data factor `R`.
     pub reciprocal_condition: f64,
     /// Truncation measure eta of the past window.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truncation: Option<f64>,
     /// Largest singular values of the weighted product.
     pub singular_values: Vec<f64>,
+    /// Spectral radius of `A`.
+    pub spectral_radius: f64,
+    /// Spectral radius of `A - K C`.
+    pub predictor_radius: f64,
     /// Test of order and window.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub order_test: Option<OrderTest>,
@@ -92,18 +97,37 @@ pub struct Summary {
     /// Evidence on the past windows.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub past_windows: Vec<PastEvidence>,
-    /// Spectral radius of `A`.
-    pub spectral_radius: f64,
-    /// Spectral radius of `A - K C`.
-    pub predictor_radius: f64,
     /// What `--stable` cost.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stability: Option<StabilityCost>,
     /// Blocks of the jackknife.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub jackknife_blocks: Option<usize>,
-    /// The recordings.
-    pub recordings: Vec<Recording>,
+}
+
+/// How the model came about.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Summary {
+    /// Algorithm.
+    pub method: String,
+    /// Weight of the singular value decomposition.
+    pub weight: Weight,
+    /// Whether the final numbers are those of the polish.
+    pub polished: bool,
+    /// Order `n`.
+    pub order: usize,
+    /// Windows.
+    pub horizons: Horizons,
+    /// Samples of all experiments (after alignment of known delays).
+    pub samples: usize,
+    /// Degrees of freedom of the innovation covariance, for each output.
+    pub degrees_of_freedom: usize,
+    /// What was asked for.
+    pub options: Asked,
+    /// Numbers that tell how far to trust the model.
+    pub diagnostics: Diagnostics,
+    /// One sentence each on how order and windows were chosen.
+    pub explanation: Vec<String>,
     /// What a user should know before trusting the model, in plain words.
     pub warnings: Vec<String>,
 }

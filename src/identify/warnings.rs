@@ -24,14 +24,14 @@ pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Option
                 .to_owned(),
         );
     }
-    if summary.spectral_radius >= 1.0 {
+    if summary.diagnostics.spectral_radius >= 1.0 {
         out.push(format!(
             "the model is unstable or integrating (spectral radius {:.6}): a free run may drift away; --stable asks for \
              a stable one",
-            summary.spectral_radius
+            summary.diagnostics.spectral_radius
         ));
     }
-    if let Some(test) = &summary.order_test
+    if let Some(test) = &summary.diagnostics.order_test
         && let Some(p) = test.p_value
         && p < REFEREE_LEVEL
     {
@@ -42,16 +42,16 @@ pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Option
             summary.order, test.chi_square, test.degrees_of_freedom
         ));
     }
-    match summary.truncation {
+    match summary.diagnostics.truncation {
         Some(eta) if eta > LARGEST_FOR_SUBSPACE => out.push(format!(
             "the past window of {} is too short for the noise dynamics (truncation {eta:.0}): estimates are biased; \
              raise --past",
-            summary.past
+            summary.horizons.past
         )),
         Some(eta) if eta > LARGEST_FOR_POLISH && options.polish == Polish::Auto => out.push(format!(
             "not polished to maximum likelihood, because the past window of {} cuts off too much (truncation \
              {eta:.1}, at most {LARGEST_FOR_POLISH}): raise --past",
-            summary.past
+            summary.horizons.past
         )),
         None if !noise_free => out.push(
             "what the past window cuts off could not be measured: the predictor of the model is not stable".to_owned(),
@@ -73,14 +73,16 @@ pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Option
              window, or one channel is computed from the others"
                 .to_owned(),
         );
-    } else if summary.route == Route::PanelQr && summary.reciprocal_condition < POOR_EXCITATION {
+    } else if summary.diagnostics.route == Route::PanelQr
+        && summary.diagnostics.reciprocal_condition < POOR_EXCITATION
+    {
         out.push(format!(
             "poor excitation: some combinations of the past signals hardly occur (reciprocal condition {:.1e}), so \
              parts of the model rest on little information; their uncertainty says so",
-            summary.reciprocal_condition
+            summary.diagnostics.reciprocal_condition
         ));
     }
-    if let Some(stability) = &summary.stability {
+    if let Some(stability) = &summary.diagnostics.stability {
         out.push(match stability.p_value {
             Some(p) if p < REFEREE_LEVEL => format!(
                 "the recording speaks against a stable model (chi-square rises by {:.1}, p = {p:.1e})",

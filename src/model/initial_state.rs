@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::error::ModelError;
 use super::predict::Predictor;
 use super::state_space::StateSpace;
-use crate::linalg::{pseudo_inverse, qr_r, symmetric_eigen};
+use crate::linalg::{LinalgError, pseudo_inverse, qr_r, symmetric_eigen};
 
 /// The initial state has no influence any more once the predictor has shrunk it this far.
 const FORGOTTEN: f64 = 1e-8;
@@ -94,6 +94,12 @@ pub fn estimate_initial_state(
     }
     let regressors = compressed.columns(0, n).into_owned();
     let target = compressed.column(n).into_owned();
+    if target.iter().any(|v| !v.is_finite()) {
+        return Err(LinalgError::NotFinite {
+            what: "initial state",
+        }
+        .into());
+    }
     Ok(pseudo_inverse(&regressors, UNDETERMINED)? * target)
 }
 
