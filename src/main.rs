@@ -1,1 +1,7 @@
-fn main() {}
+//! The `innovant` command.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    innovant::cli::run(std::env::args_os())
+}

@@ -171,7 +171,10 @@ fn printed_sign_changes_the_covariance() {
     let printed = problem.literal(-1.0);
     let corrected = problem.literal(1.0);
     let change = (&printed - &corrected).amax() / corrected.amax();
-    println!("printed minus sign of beta: covariance changes by {:.0} %", 100.0 * change);
+    println!(
+        "printed minus sign of beta: covariance changes by {:.0} %",
+        100.0 * change
+    );
     assert!(change > 0.05);
 }
 
@@ -219,8 +222,8 @@ fn error_propagation_is_exact_for_a_nilpotent_predictor() {
         ..problem.estimate.clone()
     };
     let (layout, jacobian) = subspace_jacobian(&with_truth, &problem.varx);
-    let predicted =
-        &jacobian * DMatrix::from_column_slice(jacobian.ncols(), 1, error_of_coefficients.as_slice());
+    let predicted = &jacobian
+        * DMatrix::from_column_slice(jacobian.ncols(), 1, error_of_coefficients.as_slice());
     let estimated = layout.pack(&problem.estimate.system);
     let expected = layout.pack(&in_basis);
     let mut largest = 0.0_f64;

@@ -9,9 +9,8 @@
 
 use std::ops::Mul;
 
-use nalgebra::{DMatrix, Scalar};
+use nalgebra::DMatrix;
 use num_complex::Complex64;
-use num_traits::Zero;
 
 use super::error::CovarianceError;
 use super::parameters::{ParameterCovariance, ParameterLayout};
@@ -33,10 +32,10 @@ pub(crate) struct Differential<T> {
     pub(crate) gamma: Vec<T>,
 }
 
-impl<T: Scalar + Copy + Zero + Mul<Output = T>> Differential<T> {
+impl<T: Copy + Default + Mul<Output = T>> Differential<T> {
     /// The gradient, one entry per parameter.
     pub(crate) fn gradient(&self, layout: &ParameterLayout) -> Vec<T> {
-        let mut gradient = vec![T::zero(); layout.len()];
+        let mut gradient = vec![T::default(); layout.len()];
         let mut outer = |from: usize, left: &[T], right: &[T]| {
             let rows = left.len();
             for (column, &r) in right.iter().enumerate() {

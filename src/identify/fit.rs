@@ -452,28 +452,28 @@ fn choose_order(
         note(evidence, &estimate(n)?, varx);
         evidence.iter().find(|e| e.order == n)?.p_value
     };
-    let rejects = |p: Option<f64>| p.is_none_or(|p| p < order::REFEREE_LEVEL);
+    // Without a test (the polish did not converge, as happens when the order is too high) nothing speaks
+    // against going down.
+    let accepts = |p: Option<f64>| p.is_some_and(|p| p >= order::REFEREE_LEVEL);
     let first = tested(evidence, proposal);
-    if first.is_none() {
-        return (
-            proposal,
-            format!("order {proposal}: smallest singular value criterion"),
-        );
-    }
-    if !rejects(first) {
+    if first.is_none() || accepts(first) {
         let mut order = proposal;
-        while order > 1 && !rejects(tested(evidence, order - 1)) {
+        while order > 1 && accepts(tested(evidence, order - 1)) {
             order -= 1;
         }
-        let reason = if order == proposal {
-            "smallest singular value criterion, and the chi-square test accepts it but not one state less"
-        } else {
+        let reason = if order < proposal {
             "the smallest that the chi-square test accepts"
+        } else if first.is_none() {
+            "smallest singular value criterion"
+        } else if order == 1 {
+            "smallest singular value criterion, and the chi-square test accepts it"
+        } else {
+            "smallest singular value criterion, and the chi-square test accepts it but not one state less"
         };
         return (order, format!("order {order}: {reason}"));
     }
     for order in proposal + 1..=(proposal + order::ORDERS_ABOVE).min(largest) {
-        if !rejects(tested(evidence, order)) {
+        if accepts(tested(evidence, order)) {
             return (
                 order,
                 format!(

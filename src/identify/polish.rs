@@ -27,8 +27,27 @@ use crate::model::StateSpace;
 const DECREASE: f64 = 1e-9;
 /// A Gauss-Newton iteration that has not ended by then will not.
 const ITERATIONS: usize = 60;
-/// Halvings of a step that does not decrease the cost.
-const HALVINGS: usize = 12;
+/// Steps that are tried in turn until one decreases the cost: length of the step, and Levenberg-Marquardt
+/// damping relative to the largest singular value of the Jacobian. An order too high makes the Jacobian
+/// nearly singular, and only damping helps there.
+const TRIES: [(f64, f64); 9] = [
+    (1.0, 0.0),
+    (0.5, 0.0),
+    (0.25, 0.0),
+    (1.0, 1e-5),
+    (1.0, 1e-4),
+    (1.0, 1e-3),
+    (1.0, 1e-2),
+    (1.0, 1e-1),
+    (1.0, 1.0),
+];
+/// Steps in a row that each gain less than [`GAIN`] end the iteration: a flat valley, where the cost, and
+/// with it every prediction, no longer changes.
+const FLAT_STEPS: usize = 3;
+/// See [`FLAT_STEPS`]; in units of chi-square.
+const GAIN: f64 = 1e-5;
+/// Singular values of the Jacobian below this share of the largest are not determined by the data.
+const DETERMINED: f64 = 1e-13;
 /// Radius of `A - K C` beyond which the predictor is replaced by its stabilised mirror image before the
 /// first step: powers of it up to the past window would overflow the regression.
 const LARGEST_PREDICTOR_RADIUS: f64 = 0.9999;
@@ -265,49 +284,76 @@ impl Problem<'_> {
     }
 }
 
-/// Minimum-norm Gauss-Newton step and pseudo-inverse of the information, of the rank that the
-/// input-output behaviour determines.
-struct Step {
-    step: DVector<f64>,
-    decrease: f64,
-    covariance: DMatrix<f64>,
+/// The linearised problem in the singular directions of its Jacobian: minimum-norm Gauss-Newton and damped
+/// steps, and the pseudo-inverse of the information, all of the rank that the input-output behaviour
+/// determines.
+struct Linearised {
+    /// Right singular vectors, one column a direction.
+    directions: DMatrix<f64>,
+    /// Singular values.
+    values: Vec<f64>,
+    /// Residual along the left singular vectors.
+    projected: Vec<f64>,
 }
 
-fn step(jacobian: &DMatrix<f64>, residual: &[f64], rank: usize) -> Result<Step, LinalgError> {
-    if jacobian.iter().any(|v| !v.is_finite()) {
-        return Err(LinalgError::NotFinite {
-            what: "Gauss-Newton step",
-        });
+impl Linearised {
+    fn new(jacobian: &DMatrix<f64>, residual: &[f64], rank: usize) -> Result<Self, LinalgError> {
+        let residual = DMatrix::from_column_slice(residual.len(), 1, residual);
+        let (q, r) = qr_thin(jacobian);
+        let svd = svd_thin(&r)?;
+        let rank = rank.min(svd.values.len());
+        let projected = multiply_tn(&svd.u, &multiply_tn(&q, &residual));
+        Ok(Self {
+            directions: svd.v.columns(0, rank).into_owned(),
+            values: svd.values.iter().take(rank).copied().collect(),
+            projected: projected.iter().take(rank).copied().collect(),
+        })
     }
-    let residual = DMatrix::from_column_slice(residual.len(), 1, residual);
-    let (q, r) = qr_thin(jacobian);
-    let projected = multiply_tn(&q, &residual);
-    let svd = svd_thin(&r)?;
-    let rank = rank.min(svd.values.len());
-    let rotated = multiply_tn(&svd.u, &projected);
-    let largest = svd.values.iter().fold(0.0_f64, |a, &b| a.max(b));
-    let mut scaled = svd.v.columns(0, rank).into_owned();
-    let mut decrease = 0.0;
-    let mut coefficients = DVector::zeros(rank);
-    for i in 0..rank {
-        let value = svd.values[i];
-        // A direction that the data do not determine at all takes no part.
-        let inverse = if value > 1e-13 * largest {
-            1.0 / value
-        } else {
-            0.0
-        };
-        if inverse > 0.0 {
-            decrease += rotated[(i, 0)] * rotated[(i, 0)];
+
+    fn largest(&self) -> f64 {
+        self.values.first().copied().unwrap_or(0.0)
+    }
+
+    /// Decrease of the cost that a full step promises.
+    fn decrease(&self) -> f64 {
+        let determined = DETERMINED * self.largest();
+        self.values
+            .iter()
+            .zip(&self.projected)
+            .filter(|(value, _)| **value > determined)
+            .map(|(_, p)| p * p)
+            .sum()
+    }
+
+    /// Step with Levenberg-Marquardt damping `damping` (relative to the largest singular value; zero is
+    /// Gauss-Newton).
+    fn step(&self, damping: f64) -> DVector<f64> {
+        let largest = self.largest();
+        let coefficients = DVector::from_iterator(
+            self.values.len(),
+            self.values.iter().zip(&self.projected).map(|(&value, &p)| {
+                if value > DETERMINED * largest {
+                    p * value / (value * value + (damping * largest).powi(2))
+                } else {
+                    0.0
+                }
+            }),
+        );
+        &self.directions * coefficients
+    }
+
+    fn covariance(&self) -> DMatrix<f64> {
+        let mut scaled = self.directions.clone();
+        for (i, &value) in self.values.iter().enumerate() {
+            let inverse = if value > DETERMINED * self.largest() {
+                1.0 / value
+            } else {
+                0.0
+            };
+            scaled.column_mut(i).scale_mut(inverse);
         }
-        coefficients[i] = rotated[(i, 0)];
-        scaled.column_mut(i).scale_mut(inverse);
+        multiply_nt(&scaled, &scaled)
     }
-    Ok(Step {
-        step: &scaled * coefficients,
-        decrease,
-        covariance: multiply_nt(&scaled, &scaled),
-    })
 }
 
 /// Polishes `start` against the vector ARX estimate. When `largest_radius` is given, steps that take the
@@ -357,32 +403,30 @@ pub fn polish(
     }
     let mut cost = start_cost;
     let mut iterations = 0;
+    let mut flat = 0;
     let mut converged = false;
-    let mut covariance;
-    loop {
+    let covariance = loop {
         let jacobian = problem.jacobian(&system);
+        if jacobian.iter().any(|v| !v.is_finite()) {
+            return Err(LinalgError::NotFinite {
+                what: "Gauss-Newton step",
+            });
+        }
         let residual = problem.residual(&system);
-        let Step {
-            step,
-            decrease,
-            covariance: inverse,
-        } = step(&jacobian, residual.as_slice(), rank)?;
-        covariance = inverse;
-        if decrease < DECREASE {
+        let linearised = Linearised::new(&jacobian, residual.as_slice(), rank)?;
+        if linearised.decrease() < DECREASE || flat == FLAT_STEPS {
             converged = true;
-            break;
+            break linearised.covariance();
         }
         if iterations == ITERATIONS {
-            break;
+            break linearised.covariance();
         }
         iterations += 1;
         let theta = layout.pack(&system);
-        let mut length = 1.0;
-        let mut accepted = None;
-        for _ in 0..HALVINGS {
+        let better = TRIES.iter().find_map(|&(length, damping)| {
             let moved: Vec<f64> = theta
                 .iter()
-                .zip(step.iter())
+                .zip(linearised.step(damping).iter())
                 .map(|(value, change)| value + length * change)
                 .collect();
             let candidate = layout.unpack(&moved, &system);
@@ -393,24 +437,25 @@ pub fn polish(
             } else {
                 f64::INFINITY
             };
-            if candidate_cost < cost {
-                accepted = Some((candidate, candidate_cost));
-                break;
-            }
-            length *= 0.5;
-        }
-        match accepted {
+            (candidate_cost < cost).then_some((candidate, candidate_cost))
+        });
+        match better {
             Some((candidate, candidate_cost)) => {
+                flat = if cost - candidate_cost < GAIN {
+                    flat + 1
+                } else {
+                    0
+                };
                 system = candidate;
                 cost = candidate_cost;
             }
             None => {
-                // No decrease along the step: at the minimum to rounding, or held by the constraint.
-                converged = decrease < 1e-6 * (1.0 + cost);
-                break;
+                // At the minimum to rounding, or held by the constraint.
+                converged = linearised.decrease() < GAIN * (1.0 + cost) || largest_radius.is_some();
+                break linearised.covariance();
             }
         }
-    }
+    };
     Ok(Polished {
         system,
         covariance: ParameterCovariance {

@@ -5,10 +5,10 @@ use crate::log::{
     check_same_channels, check_same_sampling,
 };
 
-/// Values kept in memory from the beginning of a recording that is streamed (48 MiB): the residual tests
+/// Values kept in memory from the beginning of a recording that is streamed (32 MiB): the residual tests
 /// and, if need be, the panel factorisation read them again. Whatever is beyond is read from the file
 /// again.
-const KEPT_VALUES: usize = 6 << 20;
+const KEPT_VALUES: usize = 4 << 20;
 
 /// Name, hash and size of one recording.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]

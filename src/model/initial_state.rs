@@ -66,7 +66,7 @@ pub fn estimate_initial_state(
         let mut filled = 0;
         for k in 0..to - from {
             let size = power.norm();
-            if size < FORGOTTEN || size > RUN_AWAY {
+            if !(FORGOTTEN..=RUN_AWAY).contains(&size) {
                 matters = false;
                 break;
             }

@@ -31,7 +31,7 @@ pub use error::ModelError;
 pub(crate) use frequency::resolvent_products;
 pub use initial_state::estimate_initial_state;
 pub use poles::Pole;
-pub(crate) use poles::{INTEGRATOR_TOLERANCE, slowest_first};
+pub(crate) use poles::slowest_first;
 pub use predict::{Prediction, Predictor};
 pub use simulate::Simulator;
 pub use state_space::StateSpace;

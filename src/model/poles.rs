@@ -11,7 +11,7 @@ use crate::linalg::eigenvalues;
 /// Where `|ln z|` (or its real part) is below this, a pole counts as an integrator (or as undamped): a
 /// time constant of 1e9 samples cannot be told from an infinite one, and rounding moves a double
 /// integrator by about this much.
-pub(crate) const INTEGRATOR_TOLERANCE: f64 = 1e-9;
+const INTEGRATOR_TOLERANCE: f64 = 1e-9;
 
 /// A pole (or a zero) `z` of a sampled system with its continuous-time reading through
 /// `s = ln(z) / Ts`, the principal logarithm.

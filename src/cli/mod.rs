@@ -1,0 +1,142 @@
+//! The command line: one file a subcommand.
+//!
+//! Flags are parsed by clap into one type and then checked into a second, which says what to do without any
+//! further question (as ripgrep does). Exit codes: 0 done, 1 the model was rejected, 2 an error, told in one
+//! message on standard error. When the reader of standard output has gone (`innovant ... | head`), the work
+//! counts as done.
+
+mod completions;
+mod deviations;
+mod identify;
+mod numbers;
+mod output;
+mod progress;
+mod roles;
+mod schema;
+mod show;
+mod simulate;
+mod terminal;
+mod validate;
+
+use std::ffi::OsString;
+use std::io;
+use std::process::ExitCode;
+
+use clap::{Args, CommandFactory, Parser, Subcommand};
+
+use crate::log::LogError;
+
+/// What is said above the list of commands.
+const ABOUT: &str = "State-space models with honest uncertainty from recordings, also in closed loop";
+
+/// What is said below it.
+const EXAMPLE: &str = "Example:
+  innovant identify log.csv --output model.json    columns u* are inputs, y* outputs, t is time
+  innovant validate model.json fresh.csv           exit code 1 when the recording speaks against the model
+  innovant simulate model.json input.csv > out.csv
+  innovant show model.json
+
+Exit codes: 0 done; 1 the model was rejected; 2 an error.";
+
+#[derive(Debug, Parser)]
+#[command(name = "innovant", version, about = ABOUT, after_help = EXAMPLE, max_term_width = 100)]
+struct Cli {
+    #[command(flatten)]
+    verbosity: Verbosity,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+/// How much is said.
+#[derive(Debug, Clone, Copy, Args)]
+struct Verbosity {
+    /// Say nothing but errors: no table, no progress, no notes
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say on standard error what is being done
+    #[arg(short, long, global = true)]
+    verbose: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Identify(identify::Flags),
+    Validate(validate::Flags),
+    Simulate(simulate::Flags),
+    Show(show::Flags),
+    Schema(schema::Flags),
+    Completions(completions::Flags),
+}
+
+/// How a command ended, if not in an error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    Done,
+    Rejected,
+}
+
+/// Runs the command line `arguments` (the first is the program's name).
+pub fn run<I, T>(arguments: I) -> ExitCode
+where
+    I: IntoIterator<Item = T>,
+    T: Into<OsString> + Clone,
+{
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(message) => {
+            // Help and version go to standard output and are no error.
+            let _ = message.print();
+            return ExitCode::from(if message.use_stderr() { 2 } else { 0 });
+        }
+    };
+    match dispatch(cli) {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::Rejected) => ExitCode::from(1),
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            // The messages of the library hold their causes already.
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn dispatch(cli: Cli) -> anyhow::Result<Outcome> {
+    let say = cli.verbosity;
+    match cli.command {
+        None => {
+            output::print(&command().render_help().to_string())?;
+            Ok(Outcome::Done)
+        }
+        Some(Command::Identify(flags)) => identify::run(flags, say),
+        Some(Command::Validate(flags)) => validate::run(flags, say),
+        Some(Command::Simulate(flags)) => simulate::run(flags, say),
+        Some(Command::Show(flags)) => show::run(flags),
+        Some(Command::Schema(flags)) => schema::run(&flags),
+        Some(Command::Completions(flags)) => completions::run(&flags),
+    }
+}
+
+/// The command line as clap knows it.
+fn command() -> clap::Command {
+    Cli::command()
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        cause
+            .downcast_ref::<LogError>()
+            .is_some_and(LogError::is_broken_pipe)
+            || cause
+                .downcast_ref::<io::Error>()
+                .is_some_and(|io| io.kind() == io::ErrorKind::BrokenPipe)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_command_line_is_consistent() {
+        super::command().debug_assert();
+    }
+}

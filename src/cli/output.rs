@@ -1,0 +1,127 @@
+//! Standard output, and files that must be writable before the work starts.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use crate::log::{LogError, Source, write_file_atomically};
+
+/// Writes text to standard output.
+pub(super) fn print(text: &str) -> io::Result<()> {
+    let mut stdout = io::stdout().lock();
+    stdout.write_all(text.as_bytes())?;
+    stdout.flush()
+}
+
+/// A place for the result that was writable when the work began.
+#[derive(Debug)]
+pub(super) struct Output {
+    path: PathBuf,
+}
+
+impl Output {
+    /// Checks that `path` (`-` is standard output) can be written, without leaving a trace, and that it is not one
+    /// of the files that are read.
+    ///
+    /// # Errors
+    /// [`LogError::Write`], or what is read would be overwritten.
+    pub(super) fn check(path: &Path, read: &[&Path]) -> anyhow::Result<Self> {
+        let output = Self {
+            path: path.to_owned(),
+        };
+        if output.is_stdout() {
+            return Ok(output);
+        }
+        let target = fs::canonicalize(path);
+        if let Ok(target) = &target {
+            for source in read {
+                if fs::canonicalize(source).is_ok_and(|source| source == *target) {
+                    anyhow::bail!(
+                        "{}: this file is read, and writing the result to it would destroy it; choose another name \
+                         for --output",
+                        path.display()
+                    );
+                }
+            }
+        }
+        let target = target.unwrap_or_else(|_| path.to_owned());
+        output.try_place(&target).map_err(|source| LogError::Write {
+            path: path.to_owned(),
+            source,
+        })?;
+        Ok(output)
+    }
+
+    fn try_place(&self, target: &Path) -> io::Result<()> {
+        match fs::metadata(target) {
+            Ok(about) if about.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
+            Ok(about) if about.permissions().readonly() => {
+                return Err(io::ErrorKind::PermissionDenied.into());
+            }
+            // A device or a pipe: opening it may have an effect, so it waits until there is something to write.
+            Ok(about) if !about.is_file() => return Ok(()),
+            _ => {}
+        }
+        if self.path.as_os_str().is_empty() {
+            return Err(io::ErrorKind::NotFound.into());
+        }
+        let folder = target
+            .parent()
+            .filter(|folder| !folder.as_os_str().is_empty())
+            .unwrap_or(Path::new("."));
+        // Deleted as soon as it is closed, which is here.
+        tempfile::tempfile_in(folder).map(drop)
+    }
+
+    /// Whether the result goes to standard output.
+    pub(super) fn is_stdout(&self) -> bool {
+        self.path.as_os_str() == "-"
+    }
+
+    /// The name for messages.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes the result; the file appears whole or not at all.
+    ///
+    /// # Errors
+    /// [`LogError::Write`].
+    pub(super) fn write(&self, text: &str) -> Result<(), LogError> {
+        write_file_atomically(&self.path, text.as_bytes())
+    }
+}
+
+/// The files among sources.
+pub(super) fn paths(sources: &[Source]) -> Vec<&Path> {
+    sources
+        .iter()
+        .filter_map(|source| match source {
+            Source::Path(path) => Some(path.as_path()),
+            Source::Stdin => None,
+        })
+        .collect()
+}
+
+/// Refuses a recording that is named twice, and standard input that is read twice.
+///
+/// # Errors
+/// Says which.
+pub(super) fn check_distinct(sources: &[Source]) -> anyhow::Result<()> {
+    for (index, source) in sources.iter().enumerate() {
+        let same = |other: &&Source| match (source, *other) {
+            (Source::Path(a), Source::Path(b)) => match (fs::canonicalize(a), fs::canonicalize(b)) {
+                // A pipe may be named twice and is another one each time.
+                (Ok(a), Ok(b)) => a == b && a.is_file(),
+                _ => a == b,
+            },
+            (a, b) => a == b,
+        };
+        if sources[..index].iter().any(|other| same(&other)) {
+            anyhow::bail!(
+                "{source} is given twice: its noise would count as twice the information; name each recording once"
+            );
+        }
+    }
+    Ok(())
+}

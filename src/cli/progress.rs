@@ -1,0 +1,75 @@
+//! A progress bar on a terminal, for work that takes a while.
+
+use std::fs;
+use std::io::{self, IsTerminal};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::identify::ReadProgress;
+use crate::log::Source;
+
+/// Below this many bytes reading is over before a bar has been seen.
+const LARGE: u64 = 50 << 20;
+
+/// Progress of reading the recordings.
+#[derive(Debug)]
+pub(super) struct Progress {
+    bar: Option<ProgressBar>,
+}
+
+impl Progress {
+    /// A bar over the bytes of all files, if standard error is a terminal and there are many.
+    pub(super) fn over(sources: &[Source], quiet: bool) -> Self {
+        let bytes: u64 = sources
+            .iter()
+            .map(|source| match source {
+                Source::Path(path) => fs::metadata(path).map_or(0, |about| about.len()),
+                Source::Stdin => 0,
+            })
+            .sum();
+        if quiet || bytes < LARGE || !io::stderr().is_terminal() {
+            return Self { bar: None };
+        }
+        let bar = ProgressBar::new(bytes);
+        let style = ProgressStyle::with_template(
+            "{msg} {wide_bar} {bytes}/{total_bytes} {bytes_per_sec}, {eta} left",
+        );
+        if let Ok(style) = style {
+            bar.set_style(style);
+        }
+        bar.set_message("reading");
+        Self { bar: Some(bar) }
+    }
+
+    /// What [`FileRecords::with_progress`](crate::identify::FileRecords::with_progress) calls: the bytes read of the
+    /// current file, which start again at each.
+    pub(super) fn callback(&self) -> ReadProgress<'static> {
+        let bar = self.bar.clone();
+        let (mut before, mut last) = (0, 0);
+        Box::new(move |bytes, _| {
+            if bytes < last {
+                before += last;
+            }
+            last = bytes;
+            if let Some(bar) = &bar {
+                bar.set_position(before + bytes);
+                if bar.length().is_some_and(|length| before + bytes >= length) {
+                    bar.set_message("fitting");
+                }
+            }
+        })
+    }
+
+    /// Takes the bar away.
+    pub(super) fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.finish();
+    }
+}

@@ -1,0 +1,31 @@
+//! `innovant schema`.
+
+use clap::{Args, ValueEnum};
+
+use super::Outcome;
+use super::output::print;
+use crate::report::model_schema;
+
+const EXAMPLE: &str = "Example:
+  innovant schema model > innovant-model-1.schema.json";
+
+/// Print the JSON Schema of a document
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLE)]
+pub(super) struct Flags {
+    /// Kind of document
+    document: Document,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Document {
+    /// innovant-model/1, what `innovant identify --output` writes
+    Model,
+}
+
+pub(super) fn run(flags: &Flags) -> anyhow::Result<Outcome> {
+    match flags.document {
+        Document::Model => print(&model_schema()?)?,
+    }
+    Ok(Outcome::Done)
+}

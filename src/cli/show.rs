@@ -1,0 +1,147 @@
+//! `innovant show`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::Outcome;
+use super::numbers;
+use super::output::print;
+use super::terminal::style;
+use crate::covariance::{Invariants, ResponsePoint, invariants};
+use crate::identify::Model;
+use crate::report::text::show_text;
+use crate::report::{names, read_model, to_json};
+
+/// Frequencies of the default grid.
+const FREQUENCIES: usize = 60;
+
+const EXAMPLE: &str = "Examples:
+  innovant show model.json
+  innovant show model.json --format json --at 0.1,0.3 | jq '.frequency_response[0].magnitude_95'
+  innovant show model.json --format csv > frequency_response.csv";
+
+/// Show what is known of a model: poles, zeros, gains, frequency response with bands
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLE)]
+pub(super) struct Flags {
+    /// Model, as `innovant identify --output` writes it, or {"A":..,"B":..,"C":..,"dt":..}; `-` is standard input
+    #[arg(value_name = "MODEL")]
+    model: PathBuf,
+    /// text: tables; json: everything; csv: the frequency response
+    #[arg(long, value_enum, default_value = "text")]
+    format: Format,
+    /// Frequencies in rad/s [default: a logarithmic grid up to Nyquist]
+    #[arg(
+        long,
+        value_name = "RAD_S",
+        value_delimiter = ',',
+        value_parser = numbers::frequency,
+        allow_negative_numbers = true
+    )]
+    at: Vec<f64>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Format {
+    Text,
+    Json,
+    Csv,
+}
+
+pub(super) fn run(flags: Flags) -> anyhow::Result<Outcome> {
+    let read = read_model(&flags.model)?;
+    let model = &read.model;
+    let frequencies = frequencies(&flags.at, model)?;
+    let described = invariants(
+        &model.system,
+        model.covariance.as_ref(),
+        &names(&model.outputs),
+        &names(&model.inputs),
+        &frequencies,
+        model.summary.as_ref().map_or(0, |s| s.options.seed),
+    )?;
+    match flags.format {
+        Format::Text => print(&show_text(
+            model,
+            &described,
+            read.document.residual_tests(),
+            !flags.at.is_empty(),
+            style(),
+        ))?,
+        Format::Json => print(&to_json(&described)?)?,
+        Format::Csv => print(&table(&described)?)?,
+    }
+    Ok(Outcome::Done)
+}
+
+fn frequencies(asked: &[f64], model: &Model) -> anyhow::Result<Vec<f64>> {
+    if asked.is_empty() {
+        return Ok(model.system.default_frequencies(FREQUENCIES)?);
+    }
+    let nyquist = model.system.nyquist();
+    // A Nyquist frequency that was typed is rounded.
+    if let Some(beyond) = asked.iter().find(|w| **w > nyquist * (1.0 + 1e-3)) {
+        anyhow::bail!(
+            "--at {beyond}: beyond the Nyquist frequency of this model, {nyquist:.6} rad/s, there is nothing to see"
+        );
+    }
+    Ok(asked.to_vec())
+}
+
+/// Both frequency responses as CSV; the innovation of output y is the input `e(y)`.
+fn table(described: &Invariants) -> anyhow::Result<String> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    csv.write_record([
+        "rad_s",
+        "hz",
+        "output",
+        "input",
+        "real",
+        "imag",
+        "variance_real",
+        "covariance_real_imag",
+        "variance_imag",
+        "magnitude",
+        "magnitude_95_low",
+        "magnitude_95_high",
+        "magnitude_99_low",
+        "magnitude_99_high",
+        "phase_rad",
+        "phase_95_low",
+        "phase_95_high",
+    ])?;
+    let points = described
+        .frequency_response
+        .iter()
+        .chain(&described.noise_response);
+    for point in points {
+        csv.write_record(record(point))?;
+    }
+    Ok(String::from_utf8(csv.into_inner()?)?)
+}
+
+fn record(point: &ResponsePoint) -> [String; 17] {
+    let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
+    let end = |band: Option<[f64; 2]>, end: usize| number(band.map(|b| b[end]));
+    let covariance = |i: usize, j: usize| number(point.covariance.map(|c| c[i][j]));
+    [
+        point.rad_s.to_string(),
+        point.hz.to_string(),
+        point.output.clone(),
+        point.input.clone(),
+        number(point.real),
+        number(point.imag),
+        covariance(0, 0),
+        covariance(0, 1),
+        covariance(1, 1),
+        number(point.magnitude),
+        end(point.magnitude_95, 0),
+        end(point.magnitude_95, 1),
+        end(point.magnitude_99, 0),
+        end(point.magnitude_99, 1),
+        number(point.phase_rad),
+        end(point.phase_95, 0),
+        end(point.phase_95, 1),
+    ]
+}

@@ -1,0 +1,172 @@
+//! `innovant simulate`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use nalgebra::DVector;
+
+use super::output::{Output, check_distinct, paths};
+use super::roles::RoleFlags;
+use super::validate::check_sampling;
+use super::{Outcome, Verbosity};
+use crate::identify::Model;
+use crate::linalg::spectral_radius;
+use crate::log::{Channel, Log, RoleNeed, Source, write_table};
+use crate::model::estimate_initial_state;
+use crate::report::read_model;
+
+const EXAMPLE: &str = "Examples:
+  innovant simulate model.json input.csv > output.csv
+  innovant simulate model.json log.csv --initial-state estimate --output output.csv.gz";
+
+/// Simulate a model on an input, in the units of the recording
+///
+/// Input columns are found by the names that the model has for them. The outputs are the free run from the inputs
+/// alone: y = level + model(u - level), known delays applied.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLE)]
+pub(super) struct Flags {
+    /// Model, as `innovant identify --output` writes it, or {"A":..,"B":..,"C":..,"dt":..}
+    #[arg(value_name = "MODEL")]
+    model: PathBuf,
+    /// Input: CSV, also gzipped; `-` is standard input
+    #[arg(value_name = "INPUT")]
+    input: Source,
+    #[command(flatten)]
+    roles: RoleFlags,
+    /// State at the first sample: zero is the operating point; estimate takes the one that fits the recorded outputs
+    /// best, which the input file must then hold too
+    #[arg(long, value_enum, default_value = "zero")]
+    initial_state: InitialState,
+    /// Write the outputs to this file, as CSV; `-` is standard output
+    #[arg(short, long, value_name = "FILE", default_value = "-")]
+    output: PathBuf,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum InitialState {
+    Zero,
+    Estimate,
+}
+
+pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
+    let sources = [flags.input.clone(), Source::from(flags.model.clone())];
+    check_distinct(&sources)?;
+    let output = Output::check(&flags.output, &paths(&sources))?;
+    let name = flags.model.display().to_string();
+    let model = read_model(&flags.model)?.model;
+    if model.inputs.is_empty() {
+        anyhow::bail!("{name}: this model has no inputs, so there is nothing to simulate");
+    }
+    let roles = flags.roles.of_model(&model.inputs, &model.outputs)?;
+    let estimate = flags.initial_state == InitialState::Estimate;
+    let need = if estimate {
+        RoleNeed::InputsAndMaybeOutputs
+    } else {
+        RoleNeed::InputsOnly
+    };
+    let log = Log::read_with(&flags.input, &roles, need)?;
+    check_sampling(&name, &model, &log)?;
+    if log.input_data.len() != model.inputs.len() {
+        // Roles that need not be there are left out when they are not.
+        let wanted: Vec<String> = model.inputs.iter().map(|c| c.channel.to_string()).collect();
+        anyhow::bail!(
+            "{}: the model needs the inputs {}, and not all of them are columns of this file; name them with --inputs",
+            log.name,
+            wanted.join(", ")
+        );
+    }
+    let inputs = input_deviations(&model, &log);
+    let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
+    let start = if estimate {
+        Some(initial_state(&model, &log, &inputs)?)
+    } else {
+        None
+    };
+    if say.verbose {
+        let from = start.as_ref().map_or("zero".to_owned(), |x0| {
+            format!("{:?}", x0.as_slice())
+        });
+        eprintln!(
+            "{}: {} samples of {} s; initial state {from}",
+            log.name,
+            log.samples(),
+            log.sample_time
+        );
+    }
+    let mut outputs = model.system.simulate(&inputs, start.as_ref())?;
+    check_finite(&model, &log, &outputs)?;
+    for (column, channel) in outputs.iter_mut().zip(&model.outputs) {
+        for value in column {
+            *value += channel.level;
+        }
+    }
+    let columns: Vec<(&Channel, &[f64])> = model
+        .outputs
+        .iter()
+        .map(|c| &c.channel)
+        .zip(outputs.iter().map(Vec::as_slice))
+        .collect();
+    write_table(output.path(), log.sample_time, log.start_time, &columns)?;
+    Ok(Outcome::Done)
+}
+
+/// Inputs as deviations from the operating point, delayed; before the first sample they stand still.
+fn input_deviations(model: &Model, log: &Log) -> Vec<Vec<f64>> {
+    model
+        .inputs
+        .iter()
+        .zip(&log.input_data)
+        .map(|(channel, column)| {
+            (0..column.len())
+                .map(|k| column[k.saturating_sub(channel.delay)] - channel.level)
+                .collect()
+        })
+        .collect()
+}
+
+fn initial_state(model: &Model, log: &Log, inputs: &[&[f64]]) -> anyhow::Result<DVector<f64>> {
+    if log.output_data.len() != model.outputs.len() {
+        let wanted: Vec<String> = model.outputs.iter().map(|c| c.channel.to_string()).collect();
+        anyhow::bail!(
+            "{}: --initial-state estimate needs the recorded outputs {} in this file, and they are not all there; \
+             name them with --outputs, or start from --initial-state zero",
+            log.name,
+            wanted.join(", ")
+        );
+    }
+    let outputs: Vec<Vec<f64>> = model
+        .outputs
+        .iter()
+        .zip(&log.output_data)
+        .map(|(channel, column)| column.iter().map(|y| y - channel.level).collect())
+        .collect();
+    let outputs: Vec<&[f64]> = outputs.iter().map(Vec::as_slice).collect();
+    // Before the longest delay the inputs are not known.
+    let delay = model.inputs.iter().map(|c| c.delay).max().unwrap_or(0);
+    let _ = delay;
+    Ok(estimate_initial_state(
+        &model.system,
+        inputs,
+        &outputs,
+        model.innovation_covariance.as_ref(),
+    )?)
+}
+
+fn check_finite(model: &Model, log: &Log, outputs: &[Vec<f64>]) -> anyhow::Result<()> {
+    let first = outputs
+        .iter()
+        .enumerate()
+        .filter_map(|(o, column)| Some((column.iter().position(|y| !y.is_finite())?, o)))
+        .min();
+    let Some((sample, output)) = first else {
+        return Ok(());
+    };
+    let radius = spectral_radius(&model.system.a).unwrap_or(f64::NAN);
+    anyhow::bail!(
+        "the simulation diverges: output {} leaves the range of numbers at sample {sample}, t = {} s; the model is \
+         unstable (spectral radius {radius:.6}): identify it again with --stable, or simulate fewer samples",
+        model.outputs[output].channel.name,
+        log.start_time + sample as f64 * log.sample_time
+    )
+}

@@ -1,0 +1,179 @@
+//! `innovant validate`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::deviations::{Deviations, Zero, judge};
+use super::output::{check_distinct, print};
+use super::roles::RoleFlags;
+use super::{Outcome, Verbosity};
+use crate::identify::{Model, Recording};
+use crate::log::{Log, Source, check_same_channels, check_same_sampling};
+use crate::moments::Detrend;
+use crate::report::text::validation_text;
+use crate::report::{read_model, to_json};
+use crate::validate::{Relation, Validation};
+
+const EXAMPLE: &str = "Examples:
+  innovant validate model.json fresh.csv && echo the model holds
+  innovant validate model.json fresh.csv --detrend mean     another operating point
+  innovant validate model.json fresh.csv --format json | jq .whiteness.p_value
+
+Exit codes: 0 accepted; 1 rejected; 2 an error.";
+
+/// Judge a model on recordings: fit, tests of the residuals, bounds
+///
+/// Columns are found by the names that the model has for them. On the recording that it was estimated from (told by
+/// its SHA-256) the tests allow for what the estimation has fitted away, on a fresh one for the errors of the
+/// parameters.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLE)]
+pub(super) struct Flags {
+    /// Model, as `innovant identify --output` writes it, or {"A":..,"B":..,"C":..,"dt":..}
+    #[arg(value_name = "MODEL")]
+    model: PathBuf,
+    /// Recordings: CSV, also gzipped; `-` is standard input
+    #[arg(value_name = "LOG", required = true)]
+    logs: Vec<Source>,
+    #[command(flatten)]
+    roles: RoleFlags,
+    /// What is taken out of each channel first [default: as for the model, or its operating point for a fresh recording]
+    #[arg(long, value_enum)]
+    detrend: Option<DetrendFlag>,
+    /// Probability that a right model is rejected
+    #[arg(long, default_value_t = 0.01, value_name = "P")]
+    level: f64,
+    /// How to print the result
+    #[arg(long, value_enum, default_value = "text")]
+    format: Format,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum DetrendFlag {
+    /// The operating point of the model
+    Level,
+    /// The mean of the recording
+    Mean,
+    /// The straight line through the recording
+    Linear,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Format {
+    /// Tables
+    Text,
+    /// A document
+    Json,
+}
+
+/// The result as a document.
+#[derive(Serialize)]
+struct ValidationDocument<'a> {
+    format: &'static str,
+    model: String,
+    recordings: Vec<Recording>,
+    #[serde(flatten)]
+    validation: &'a Validation,
+}
+
+pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
+    let mut sources = flags.logs.clone();
+    if flags.model.as_os_str() == "-" {
+        sources.push(Source::Stdin);
+    }
+    check_distinct(&sources)?;
+    let model = read_model(&flags.model)?.model;
+    if model.inputs.is_empty() {
+        anyhow::bail!(
+            "{}: this model has no inputs; a recording of outputs alone cannot be compared with it yet",
+            flags.model.display()
+        );
+    }
+    let roles = flags.roles.of_model(&model.inputs, &model.outputs)?;
+    let mut logs = Vec::with_capacity(flags.logs.len());
+    for source in &flags.logs {
+        let log = Log::read(source, &roles)?;
+        check_sampling(&flags.model.display().to_string(), &model, &log)?;
+        if let Some(first) = logs.first() {
+            check_experiment(first, &log)?;
+        }
+        logs.push(log);
+    }
+    let relation = relation(&model, &logs);
+    let zero = match (flags.detrend, relation) {
+        (Some(DetrendFlag::Level), _) | (None, Relation::Fresh) => Zero::Levels,
+        (Some(DetrendFlag::Mean), _) => Zero::Own(Detrend::Mean),
+        (Some(DetrendFlag::Linear), _) => Zero::Own(Detrend::Linear),
+        (None, Relation::Estimation) => Zero::of_estimation(&model),
+    };
+    let records: Vec<Deviations> = logs
+        .iter()
+        .map(|log| Deviations::of_log(log, &model, zero))
+        .collect();
+    let tests = judge(&model, &records, relation, Some(flags.level)).map_err(|reason| {
+        let names: Vec<&str> = logs.iter().map(|log| log.name.as_str()).collect();
+        anyhow::anyhow!("{}: {reason}", names.join(", "))
+    })?;
+    match flags.format {
+        Format::Json => print(&to_json(&ValidationDocument {
+            format: "innovant-validation/1",
+            model: flags.model.display().to_string(),
+            recordings: logs.iter().map(recording).collect(),
+            validation: &tests,
+        })?)?,
+        Format::Text if say.quiet => {}
+        Format::Text => print(&validation_text(&tests))?,
+    }
+    Ok(if tests.rejected {
+        Outcome::Rejected
+    } else {
+        Outcome::Done
+    })
+}
+
+/// Whether the sampling of a recording is that of the model, to 0.1 %.
+pub(super) fn check_sampling(name: &str, model: &Model, log: &Log) -> anyhow::Result<()> {
+    let (expected, found) = (model.system.sample_time, log.sample_time);
+    if check_same_sampling(name, expected, &log.name, found).is_err() {
+        anyhow::bail!(
+            "{}: the sample time is {found} s, but the model ({name}) has {expected} s; resample the recording to \
+             {expected} s, or identify a model at {found} s (when only the time stamps are off, `--dt {expected}` \
+             ignores them)",
+            log.name
+        );
+    }
+    Ok(())
+}
+
+/// With `--inputs` and `--outputs` the columns are the same by construction; the units may still differ.
+fn check_experiment(first: &Log, log: &Log) -> anyhow::Result<()> {
+    check_same_channels(&first.name, &first.inputs, &log.name, &log.inputs, "inputs")?;
+    check_same_channels(&first.name, &first.outputs, &log.name, &log.outputs, "outputs")?;
+    Ok(())
+}
+
+/// The recordings are those of the estimation when all of them are.
+fn relation(model: &Model, logs: &[Log]) -> Relation {
+    let known = |log: &Log| {
+        model
+            .recordings
+            .iter()
+            .any(|r| r.sha256.is_some() && r.sha256 == log.sha256)
+    };
+    if logs.iter().all(known) {
+        Relation::Estimation
+    } else {
+        Relation::Fresh
+    }
+}
+
+fn recording(log: &Log) -> Recording {
+    Recording {
+        name: log.name.clone(),
+        sha256: log.sha256.clone(),
+        samples: log.samples(),
+        start_time: log.start_time,
+    }
+}

@@ -1,0 +1,33 @@
+//! Documents and tables: a model as JSON (`innovant-model/1`), as a JSON Schema, and as text for people.
+//!
+//! | file             | one idea                                                          |
+//! |------------------|-------------------------------------------------------------------|
+//! | `model_document` | the keys of `innovant-model/1`                                    |
+//! | `channels`, `matrix`, `packed` | its parts                                           |
+//! | `read`           | text to model, with errors that name line, column and key         |
+//! | `json`           | how JSON is laid out; `location`: where in it something stands    |
+//! | `schema`         | the JSON Schema                                                   |
+//! | `text`           | tables for a terminal                                             |
+
+mod channels;
+mod error;
+mod json;
+mod location;
+mod matrix;
+mod model_document;
+mod packed;
+mod read;
+mod schema;
+pub mod text;
+
+pub use channels::{InputDocument, OutputDocument};
+pub use error::DocumentError;
+pub(crate) use json::to_json;
+pub use matrix::Rows;
+pub(crate) use model_document::names;
+pub use model_document::{
+    DiagnosticsDocument, InvariantsDocument, MODEL_FORMAT, ModelDocument, Provenance,
+};
+pub use packed::CovarianceDocument;
+pub use read::{ReadModel, parse_model, read_model};
+pub use schema::model_schema;

@@ -1,0 +1,79 @@
+//! Tables for people: nothing wider than a hundred columns.
+
+mod model_text;
+mod number;
+mod orders;
+mod roots;
+mod show;
+mod table;
+mod validation_text;
+mod verdict;
+
+pub use model_text::{ModelText, model_text};
+pub use orders::comparison;
+pub use show::show_text;
+pub use validation_text::validation_text;
+pub use verdict::verdict;
+
+/// Widest line.
+pub const WIDTH: usize = 100;
+
+/// How text is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Style {
+    /// Between a value and its standard deviation.
+    pub plus_minus: &'static str,
+}
+
+impl Style {
+    /// For a terminal that knows ASCII only.
+    pub const ASCII: Self = Self { plus_minus: "+-" };
+    /// For a terminal that knows Unicode.
+    pub const UNICODE: Self = Self { plus_minus: "±" };
+}
+
+/// `text` in lines of at most [`WIDTH`] columns; the first starts with `first`, the others with as many spaces.
+pub(crate) fn wrapped(first: &str, text: &str) -> String {
+    let indent = first.chars().count();
+    let mut out = String::from(first);
+    let mut column = indent;
+    for (index, word) in text.split_whitespace().enumerate() {
+        let width = word.chars().count();
+        if index > 0 && column + 1 + width > WIDTH {
+            out.push('\n');
+            out.push_str(&" ".repeat(indent));
+            column = indent;
+        } else if index > 0 {
+            out.push(' ');
+            column += 1;
+        }
+        out.push_str(word);
+        column += width;
+    }
+    out.push('\n');
+    out
+}
+
+/// `1 input`, `2 inputs`.
+pub(crate) fn count(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_sentences_are_wrapped_and_indented() {
+        let text = wrapped("warning: ", &"word ".repeat(60));
+        assert!(text.lines().all(|line| line.chars().count() <= WIDTH));
+        assert!(text.lines().skip(1).all(|line| line.starts_with("         word")));
+        assert_eq!(text.matches("word").count(), 60);
+    }
+
+    #[test]
+    fn one_is_singular() {
+        assert_eq!(count(1, "input"), "1 input");
+        assert_eq!(count(2, "output"), "2 outputs");
+    }
+}

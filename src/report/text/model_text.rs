@@ -1,0 +1,156 @@
+//! The summary of an identification.
+
+use std::fmt;
+
+use super::number::{percent, significant};
+use super::orders::order_evidence;
+use super::roots::{roots, shortened, static_gains};
+use super::table::Table;
+use super::validation_text::findings;
+use super::verdict::verdict;
+use super::{Style, comparison, wrapped};
+use crate::covariance::{Invariants, invariants};
+use crate::identify::{CovarianceKind, Model, Summary};
+use crate::report::names;
+use crate::validate::Validation;
+
+/// What the summary of a model shows.
+#[derive(Debug, Clone, Copy)]
+pub struct ModelText<'a> {
+    /// The model.
+    pub model: &'a Model,
+    /// Tests of its residuals.
+    pub tests: Option<&'a Validation>,
+    /// Orders that were asked for, when there were several.
+    pub orders: &'a [usize],
+    /// How to write it.
+    pub style: Style,
+}
+
+/// Verdict, fit, poles, gains, how order and windows were chosen, warnings.
+pub fn model_text(text: &ModelText<'_>) -> String {
+    let ModelText {
+        model,
+        tests,
+        orders,
+        style,
+    } = *text;
+    let mut out = wrapped("", &verdict(model, tests));
+    if let Some(tests) = tests {
+        out.push_str(&fit(tests));
+    }
+    if let Some(described) = described(model) {
+        out.push_str(&dynamics(model, &described, style));
+    }
+    if let Some(summary) = &model.summary {
+        out.push_str(&if orders.len() > 1 {
+            comparison(summary, orders)
+        } else {
+            order_evidence(summary)
+        });
+        out.push_str(&how(summary));
+        let warnings = summary.warnings.iter().map(|w| ("warning: ", w));
+        let found = tests.map(findings).unwrap_or_default();
+        let found = found.iter().map(|f| ("finding: ", f));
+        for (index, (word, sentence)) in warnings.chain(found).enumerate() {
+            if index == 0 {
+                out.push('\n');
+            }
+            out.push_str(&wrapped(word, sentence));
+        }
+    }
+    out
+}
+
+/// Everything but the frequency response; `None` when it cannot be computed.
+pub(super) fn described(model: &Model) -> Option<Invariants> {
+    invariants(
+        &model.system,
+        model.covariance.as_ref(),
+        &names(&model.outputs),
+        &names(&model.inputs),
+        &[],
+        0,
+    )
+    .ok()
+}
+
+/// Poles and gains.
+pub(super) fn dynamics(model: &Model, described: &Invariants, style: Style) -> String {
+    let spread = match (&model.covariance, style.plus_minus) {
+        (Some(_), pm) => format!(" ({pm} one standard deviation)"),
+        (None, _) => String::new(),
+    };
+    let channels = |of: &[crate::identify::IdentifiedChannel]| {
+        of.iter().map(|c| c.channel.clone()).collect::<Vec<_>>()
+    };
+    let mut out = roots(&format!("Poles{spread}"), &described.poles, style);
+    out.push_str(&static_gains(
+        &format!("Static gain{spread}"),
+        &described.static_gain,
+        &channels(&model.inputs),
+        &channels(&model.outputs),
+        style,
+    ));
+    out
+}
+
+/// Fit of each output.
+pub(super) fn fit(tests: &Validation) -> String {
+    let mut table = Table::new(["output", "one step ahead", "rms error", "free run", "rms error"]);
+    for (index, one) in tests.one_step.outputs.iter().enumerate() {
+        let free = tests.free_run.as_ref().and_then(|f| f.outputs.get(index));
+        table.row([
+            shortened(&one.output),
+            percent(one.fit_percent),
+            significant(one.rms_error, 4),
+            free.map_or("-".to_owned(), |f| percent(f.fit_percent)),
+            free.map_or("-".to_owned(), |f| significant(f.rms_error, 4)),
+        ]);
+    }
+    let mut out = format!("\nFit\n{}", table.lines());
+    if let Some(reason) = &tests.free_run_unavailable {
+        out.push_str(&wrapped("  no free run: ", reason));
+    }
+    out
+}
+
+/// How the numbers came about.
+fn how(summary: &Summary) -> String {
+    let mut out = String::from("\nHow\n");
+    for sentence in &summary.explanation {
+        out.push_str(&wrapped("  ", sentence));
+    }
+    let polish = if summary.polished {
+        "polished to maximum likelihood"
+    } else {
+        "not polished"
+    };
+    let covariance = match (summary.options.covariance, summary.diagnostics.jackknife_blocks) {
+        (CovarianceKind::Model, _) => "covariance from the model".to_owned(),
+        (CovarianceKind::Robust, Some(blocks)) => {
+            format!("covariance from {blocks} blocks of the data (jackknife)")
+        }
+        (CovarianceKind::Robust, None) => "robust covariance".to_owned(),
+    };
+    out.push_str(&wrapped(
+        "  ",
+        &format!(
+            "{}, past window {}, future window {}, {polish}; {covariance}",
+            summary.method, summary.horizons.past, summary.horizons.future
+        ),
+    ));
+    out
+}
+
+impl fmt::Display for Model {
+    /// The summary that `innovant identify` prints, without the tests of the residuals.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&model_text(&ModelText {
+            model: self,
+            tests: None,
+            orders: &[],
+            style: Style::ASCII,
+        }))
+    }
+}

@@ -1,0 +1,73 @@
+//! What speaks for and against each order.
+
+use super::number::{probability, significant};
+use super::table::Table;
+use crate::identify::{OrderEvidence, Summary};
+
+/// Orders shown on either side of the choice.
+const NEIGHBOURS: usize = 2;
+
+/// The evidence around the chosen order, and on every order that was tested.
+pub(super) fn order_evidence(summary: &Summary) -> String {
+    let chosen = summary.order;
+    let shown = |e: &&OrderEvidence| {
+        e.order.abs_diff(chosen) <= NEIGHBOURS || e.p_value.is_some()
+    };
+    table("Order", summary, summary.diagnostics.orders.iter().filter(shown))
+}
+
+/// The comparison of the orders that were asked for.
+pub fn comparison(summary: &Summary, asked: &[usize]) -> String {
+    let among = |e: &&OrderEvidence| asked.contains(&e.order);
+    table(
+        "Orders asked for",
+        summary,
+        summary.diagnostics.orders.iter().filter(among),
+    )
+}
+
+fn table<'a>(
+    title: &str,
+    summary: &Summary,
+    evidence: impl Iterator<Item = &'a OrderEvidence>,
+) -> String {
+    let mut table = Table::new([
+        "order",
+        "correlation",
+        "criterion",
+        "chi-square",
+        "freedom",
+        "p",
+        "Schwarz",
+        "radius",
+    ]);
+    let number = |value: Option<f64>, digits: usize| {
+        value.map_or("-".to_owned(), |value| significant(value, digits))
+    };
+    let mut sorted: Vec<&OrderEvidence> = evidence.collect();
+    sorted.sort_by_key(|e| e.order);
+    for e in sorted {
+        let mark = if e.order == summary.order { " *" } else { "" };
+        // An order beyond what the singular values reach has no criterion.
+        let known = e.singular_value_criterion < f64::MAX;
+        table.row([
+            format!("{}{mark}", e.order),
+            number(known.then_some(e.canonical_correlation), 3),
+            number(known.then_some(e.singular_value_criterion), 3),
+            e.chi_square.map_or("-".to_owned(), |c| format!("{c:.1}")),
+            e.degrees_of_freedom
+                .map_or("-".to_owned(), |d| d.to_string()),
+            e.p_value.map_or("-".to_owned(), probability),
+            e.schwarz.map_or("-".to_owned(), |s| format!("{s:.1}")),
+            e.spectral_radius
+                .map_or("-".to_owned(), |r| format!("{r:.4}")),
+        ]);
+    }
+    if table.is_empty() {
+        return String::new();
+    }
+    format!(
+        "\n{title} (* chosen; small p speaks against an order, small criteria for it)\n{}",
+        table.lines()
+    )
+}

@@ -1,0 +1,111 @@
+//! The judgement of a model on a recording.
+
+use super::model_text::fit;
+use super::number::{percent, probability, significant};
+use super::roots::shortened;
+use super::table::Table;
+use super::{count, wrapped};
+use crate::validate::{Relation, ResidualTest, Validation};
+
+/// Verdict, fit, tests and findings.
+pub fn validation_text(tests: &Validation) -> String {
+    let data = match tests.relation {
+        Relation::Estimation => "the recording it was estimated from",
+        Relation::Fresh => "a recording it has not seen",
+    };
+    let verdict = if tests.rejected {
+        format!(
+            "Model rejected on {data} ({} samples): a right model is, in {} of cases",
+            tests.samples,
+            percent(100.0 * tests.level)
+        )
+    } else {
+        format!(
+            "Model accepted on {data} ({} samples): nothing speaks against it",
+            tests.samples
+        )
+    };
+    let mut out = wrapped("", &verdict);
+    out.push_str(&fit(tests));
+    out.push_str(&residual_tests(tests));
+    out.push_str(&sizes(tests));
+    for (index, sentence) in findings(tests).iter().enumerate() {
+        if index == 0 {
+            out.push('\n');
+        }
+        out.push_str(&wrapped("finding: ", sentence));
+    }
+    out
+}
+
+/// The findings as they are.
+pub(super) fn findings(tests: &Validation) -> Vec<String> {
+    tests.findings.clone()
+}
+
+fn residual_tests(tests: &Validation) -> String {
+    let mut table = Table::new([
+        "",
+        "chi-square",
+        "freedom",
+        "p",
+        "share",
+        "strongest",
+    ])
+    .flush_left(5);
+    let rows: [(&str, &Option<ResidualTest>); 4] = [
+        ("residuals on their own past", &tests.whiteness),
+        ("residuals on past inputs", &tests.past_inputs),
+        ("same sample (information)", &tests.same_sample),
+        ("inputs on past residuals (information)", &tests.feedback),
+    ];
+    for (name, test) in rows {
+        let Some(test) = test else { continue };
+        table.row([
+            name.to_owned(),
+            format!("{:.1}", test.statistic),
+            test.degrees_of_freedom.to_string(),
+            probability(test.p_value),
+            percent(100.0 * test.explained_share),
+            test.strongest.as_ref().map_or(String::new(), |s| {
+                format!(
+                    "{} -> {} lag {}: {:+.3} (99 % within {:.3})",
+                    shortened(&s.from),
+                    shortened(&s.to),
+                    s.lag,
+                    s.correlation,
+                    s.bound_99
+                )
+            }),
+        ]);
+    }
+    if table.is_empty() {
+        return String::new();
+    }
+    format!(
+        "\nTests of the residuals, {} (share: of the variance that is explained)\n{}",
+        count(tests.lags, "lag"),
+        table.lines()
+    )
+}
+
+fn sizes(tests: &Validation) -> String {
+    let Some(size) = &tests.innovation_size else {
+        return String::new();
+    };
+    let mut table = Table::new(["output", "stated", "found", "ratio", "expected", "p"]);
+    for output in &size.outputs {
+        table.row([
+            shortened(&output.output),
+            significant(output.stated_variance.sqrt(), 4),
+            significant(output.residual_variance.sqrt(), 4),
+            format!("{:.3}", output.ratio),
+            format!("{:.3}", output.expected_ratio),
+            probability(output.p_value),
+        ]);
+    }
+    format!(
+        "\nSize of the residuals (rms; ratio of variances)\n{}",
+        table.lines()
+    )
+}

@@ -1,0 +1,56 @@
+//! The first line: what this model is, and whether to trust it.
+
+use super::count;
+use super::number::significant;
+use crate::identify::{Model, Summary};
+use crate::validate::Validation;
+
+/// Level below which the test of the order speaks against the model.
+const ORDER_TEST_LEVEL: f64 = 0.01;
+
+/// One sentence: size of the model, what it rests on, and the verdict in plain words.
+pub fn verdict(model: &Model, tests: Option<&Validation>) -> String {
+    let system = &model.system;
+    let size = format!(
+        "Order {} model of {} from {}",
+        system.states(),
+        count(system.outputs(), "output"),
+        count(system.inputs(), "input")
+    );
+    let sample_time = significant(system.sample_time, 6);
+    match &model.summary {
+        None => format!("{size}, sampled every {sample_time} s, without uncertainty"),
+        Some(summary) => format!(
+            "{size}, {} samples, {sample_time} s: {}",
+            summary.samples,
+            judgement(summary, tests)
+        ),
+    }
+}
+
+fn judgement(summary: &Summary, tests: Option<&Validation>) -> String {
+    let order_too_low = summary
+        .diagnostics
+        .order_test
+        .as_ref()
+        .and_then(|test| test.p_value)
+        .is_some_and(|p| p < ORDER_TEST_LEVEL);
+    let vanished = tests.is_some_and(|t| t.whiteness.is_none() && t.past_inputs.is_none());
+    let main = if tests.is_some_and(|t| t.rejected) {
+        "rejected, the recording holds more than it explains"
+    } else if order_too_low {
+        "the recording holds more than it explains"
+    } else if vanished {
+        "exact to rounding"
+    } else if tests.is_some() {
+        "nothing left to explain"
+    } else {
+        "identified"
+    };
+    match summary.warnings.len() {
+        0 => main.to_owned(),
+        // The verdict says already what this one warns of.
+        1 if order_too_low => main.to_owned(),
+        n => format!("{main}, but see {}", count(n, "warning")),
+    }
+}

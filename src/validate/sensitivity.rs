@@ -1,0 +1,536 @@
+//! How residuals move with the parameters of the model.
+//!
+//! With `dx = dx[k]/d theta` along a direction `(dA, dB, dK, dC, dD)` of the parameter space,
+//!
+//! `dx[k+1] = (A - K C) dx[k] + dA x[k] + dB u[k] + dK e[k] - K (dC x[k] + dD u[k])`,
+//! `de[k]   = -C dx[k] - dC x[k] - dD u[k]`,
+//!
+//! the derivative of the predictor (Ljung, *System Identification*, 2nd ed., section 10.3). Directions that
+//! only change the state basis give `de = 0`.
+
+use nalgebra::DMatrix;
+
+use super::error::ValidateError;
+use super::options::RecordView;
+use super::partial::Partial;
+use super::residuals::Start;
+use crate::covariance::ParameterCovariance;
+use crate::linalg::{multiply, multiply_nt, symmetric_eigen};
+use crate::model::StateSpace;
+
+/// Most samples that the sensitivities are averaged over.
+const MOST_SAMPLES: usize = 20_000;
+/// Fewest, whatever the effort.
+const FEWEST_SAMPLES: usize = 4_000;
+/// Multiplications that the averages may take.
+const EFFORT: usize = 60_000_000;
+/// Samples handled at a time.
+const BLOCK: usize = 512;
+/// Batches that tell how accurate the averages are, at most and at least so long.
+const BATCHES: usize = 16;
+const SHORTEST_BATCH: usize = 64;
+/// Parameter directions below this share of the largest variance, parameters scaled to unit variance, are
+/// directions of the state basis.
+const GAUGE: f64 = 1e-9;
+
+/// A regressor: channel (inputs, then residuals) and lag.
+pub(super) type Regressor = (usize, usize);
+
+/// Sensitivities along directions of the parameter space, with the samples they belong to.
+#[derive(Debug)]
+pub(super) struct Sensitivity {
+    segments: Vec<Segment>,
+    /// Number of directions `m`.
+    directions: usize,
+    inputs: usize,
+    outputs: usize,
+    past: usize,
+    /// Covariance of the coordinates along the directions.
+    covariance: DMatrix<f64>,
+    /// Number of parameters that the data determine.
+    rank: usize,
+    /// Mean of `psi Cov(theta) psi'` for each output: residual variance that parameter errors add.
+    pub(super) excess: Vec<f64>,
+}
+
+/// Consecutive samples of one record.
+#[derive(Debug)]
+struct Segment {
+    /// `[u; e]` about their means, sample after sample.
+    z: Vec<f64>,
+    /// `de/d theta`, sample after sample, entry `output * directions + direction`.
+    psi: Vec<f64>,
+    samples: usize,
+}
+
+/// Averages of tested regressors times sensitivities, both whitened.
+#[derive(Debug, Clone)]
+pub(super) struct Averages {
+    /// `E[w_white (x) t_white-sensitivity]`, `dimension x m`.
+    pub(super) cross: DMatrix<f64>,
+    /// Mean square error of one entry of `cross Cov^(1/2)`, from the scatter of batches.
+    pub(super) error: f64,
+    /// `E[psi' Lambda^-1 psi]`, `m x m`.
+    pub(super) information: DMatrix<f64>,
+    /// Samples averaged over.
+    pub(super) samples: usize,
+}
+
+impl Sensitivity {
+    /// Runs the sensitivity filters over the beginning of the records.
+    ///
+    /// With `whole_space`, along all parameters instead of only those in the range of the covariance: a
+    /// jackknife covariance may have a smaller rank than the model has parameters.
+    pub(super) fn new(
+        system: &StateSpace,
+        covariance: &ParameterCovariance,
+        records: &[RecordView<'_>],
+        starts: &[Start],
+        past: usize,
+        whole_space: bool,
+    ) -> Result<Option<Self>, ValidateError> {
+        let (basis, inner, rank) = directions(covariance, whole_space)?;
+        let m = basis.ncols();
+        if m == 0 {
+            return Ok(None);
+        }
+        let (r, l) = (system.inputs(), system.outputs());
+        let width = (past + 1) * (r + l);
+        let limit = (EFFORT / (m * l * width)).clamp(FEWEST_SAMPLES, MOST_SAMPLES);
+        let total: usize = records.iter().map(RecordView::samples).sum();
+        let filters = Filters::new(system, covariance, &basis);
+        let mut segments = Vec::new();
+        let mut excess = vec![0.0; l];
+        let mut used = 0.0;
+        for (record, start) in records.iter().zip(starts) {
+            let kept = record.samples() - start.dropped;
+            let share = if total > limit {
+                kept.min((limit * kept / total).max(2 * past))
+            } else {
+                kept
+            };
+            if share <= past {
+                continue;
+            }
+            let segment = filters.run(system, record, start, share);
+            for sample in segment.psi[past * l * m..].chunks_exact(l * m) {
+                for (o, row) in sample.chunks_exact(m).enumerate() {
+                    excess[o] += if whole_space {
+                        quadratic(&inner, row)
+                    } else {
+                        row.iter().map(|v| v * v).sum()
+                    };
+                }
+            }
+            used += (share - past) as f64;
+            segments.push(segment);
+        }
+        if segments.is_empty() {
+            return Ok(None);
+        }
+        let finite = segments
+            .iter()
+            .all(|segment| segment.psi.iter().all(|v| v.is_finite()));
+        if !finite {
+            return Err(crate::linalg::LinalgError::NotFinite {
+                what: "sensitivities of the predictor",
+            }
+            .into());
+        }
+        Ok(Some(Self {
+            segments,
+            directions: m,
+            inputs: r,
+            outputs: l,
+            past,
+            covariance: inner,
+            rank,
+            excess: excess.into_iter().map(|v| v / used).collect(),
+        }))
+    }
+
+    /// Number of parameters that the data determine.
+    pub(super) fn rank(&self) -> usize {
+        self.rank
+    }
+
+    /// `F` with `F F' =` the covariance of the coordinates.
+    pub(super) fn covariance(&self) -> &DMatrix<f64> {
+        &self.covariance
+    }
+
+    /// Averages for a test: `tested` given `conditions`, which are lags of the residuals.
+    pub(super) fn averages(
+        &self,
+        partial: &Partial,
+        conditions: &[Regressor],
+        tested: &[Regressor],
+    ) -> Averages {
+        let (m, l) = (self.directions, self.outputs);
+        let q = self.inputs + l;
+        let regressors: Vec<Regressor> = conditions.iter().chain(tested).copied().collect();
+        let n = partial.samples as f64;
+        let rank_w = partial.theta.nrows();
+        let rank_t = partial.target.nrows();
+        let used: usize = self.segments.iter().map(|s| s.samples - self.past).sum();
+        let batch = (used / BATCHES).max(SHORTEST_BATCH);
+
+        let whiten = |sum: &DMatrix<f64>, samples: f64| {
+            let half = multiply(&partial.theta, sum); // rank_w x (l m)
+            let mut cross = DMatrix::zeros(rank_w * rank_t, m);
+            for direction in 0..m {
+                for t in 0..rank_t {
+                    for o in 0..l {
+                        let factor = partial.target[(t, o)] * n / samples;
+                        for w in 0..rank_w {
+                            cross[(w + rank_w * t, direction)] +=
+                                factor * half[(w, o * m + direction)];
+                        }
+                    }
+                }
+            }
+            cross
+        };
+
+        let mut sum = DMatrix::zeros(regressors.len(), l * m);
+        let mut information = DMatrix::zeros(m, m);
+        let mut batches: Vec<DMatrix<f64>> = Vec::new();
+        for segment in &self.segments {
+            let mut from = self.past;
+            while from < segment.samples {
+                // The last batch takes what is left over.
+                let to = if segment.samples - from < 2 * batch {
+                    segment.samples
+                } else {
+                    from + batch
+                };
+                let mut part = DMatrix::zeros(regressors.len(), l * m);
+                let mut begin = from;
+                while begin < to {
+                    let end = (begin + BLOCK).min(to);
+                    let psi = segment.filtered(begin, end, conditions, partial, self);
+                    let w = DMatrix::from_fn(regressors.len(), end - begin, |i, k| {
+                        let (channel, lag) = regressors[i];
+                        segment.z[(begin + k - lag) * q + channel]
+                    });
+                    part += multiply_nt(&w, &psi);
+                    // Whitened target rows, one block of `m` a target direction.
+                    for t in 0..rank_t {
+                        let mut rows = DMatrix::zeros(m, end - begin);
+                        for o in 0..l {
+                            rows += psi.rows(o * m, m) * partial.target[(t, o)];
+                        }
+                        information += multiply_nt(&rows, &rows);
+                    }
+                    begin = end;
+                }
+                batches.push(whiten(&part, (to - from) as f64));
+                sum += part;
+                from = to;
+            }
+        }
+        let cross = whiten(&sum, used as f64);
+        let count = batches.len() as f64;
+        let scatter: f64 = batches
+            .iter()
+            .map(|part| {
+                let difference = part - &cross;
+                multiply(&difference, &self.covariance).component_mul(&difference).sum()
+            })
+            .sum();
+        let error = if count > 1.0 {
+            scatter / (count * (count - 1.0) * (cross.nrows().max(1)) as f64)
+        } else {
+            0.0
+        };
+        Averages {
+            cross,
+            error,
+            information: information * (n / used as f64),
+            samples: used,
+        }
+    }
+}
+
+impl Segment {
+    /// Sensitivities of samples `from..to`, filtered like the target: `psi[k] - sum Phi_c psi[k - lag]` with the
+    /// autoregression of the residuals that the conditions are. One column a sample.
+    fn filtered(
+        &self,
+        from: usize,
+        to: usize,
+        conditions: &[Regressor],
+        partial: &Partial,
+        of: &Sensitivity,
+    ) -> DMatrix<f64> {
+        let (m, l) = (of.directions, of.outputs);
+        let width = l * m;
+        let mut out =
+            DMatrix::from_column_slice(width, to - from, &self.psi[from * width..to * width]);
+        for (c, &(channel, lag)) in conditions.iter().enumerate() {
+            let other = channel - of.inputs;
+            for o in 0..l {
+                let factor = partial.coefficients[(o, c)];
+                for k in from..to {
+                    let at = (k - lag) * width + other * m;
+                    let past = &self.psi[at..at + m];
+                    let column = (k - from) * width + o * m;
+                    let now = &mut out.as_mut_slice()[column..column + m];
+                    for (n, p) in now.iter_mut().zip(past) {
+                        *n -= factor * p;
+                    }
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Basis of the parameter space (columns), covariance of the coordinates, and rank.
+fn directions(
+    covariance: &ParameterCovariance,
+    whole_space: bool,
+) -> Result<(DMatrix<f64>, DMatrix<f64>, usize), ValidateError> {
+    let matrix = &covariance.matrix;
+    let deviation: Vec<f64> = matrix.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect();
+    let inverse = |i: usize| {
+        if deviation[i] > 0.0 {
+            1.0 / deviation[i]
+        } else {
+            0.0
+        }
+    };
+    let order = matrix.nrows();
+    let correlation = DMatrix::from_fn(order, order, |i, j| {
+        0.5 * (matrix[(i, j)] + matrix[(j, i)]) * inverse(i) * inverse(j)
+    });
+    if order == 0 || correlation.amax() == 0.0 {
+        return Ok((DMatrix::zeros(order, 0), DMatrix::zeros(0, 0), 0));
+    }
+    if whole_space {
+        let scale = DMatrix::from_fn(order, order, |i, j| if i == j { deviation[i] } else { 0.0 });
+        return Ok((scale, correlation, covariance.layout.identifiable()));
+    }
+    let eigen = symmetric_eigen(&correlation)?;
+    let largest = eigen.values.amax();
+    let kept: Vec<usize> = (0..order)
+        .filter(|&i| eigen.values[i] > GAUGE * largest)
+        .collect();
+    let basis = DMatrix::from_fn(order, kept.len(), |i, j| {
+        deviation[i] * eigen.vectors[(i, kept[j])] * eigen.values[kept[j]].sqrt()
+    });
+    let m = kept.len();
+    Ok((basis, DMatrix::identity(m, m), m))
+}
+
+fn quadratic(matrix: &DMatrix<f64>, v: &[f64]) -> f64 {
+    (0..v.len())
+        .map(|i| v[i] * (0..v.len()).map(|j| matrix[(i, j)] * v[j]).sum::<f64>())
+        .sum()
+}
+
+/// The sensitivity filters of all directions.
+struct Filters {
+    /// Rows `state * m + direction` then `n m + output * m + direction`, from `[x; u; e]`: the forcing of `dx`,
+    /// and `dC x + dD u`.
+    forcing: DMatrix<f64>,
+    predictor: DMatrix<f64>,
+    directions: usize,
+}
+
+impl Filters {
+    fn new(system: &StateSpace, covariance: &ParameterCovariance, basis: &DMatrix<f64>) -> Self {
+        let (n, r, l) = (system.states(), system.inputs(), system.outputs());
+        let layout = covariance.layout;
+        let m = basis.ncols();
+        let mut forcing = DMatrix::zeros((n + l) * m, n + r + l);
+        for c in 0..m {
+            let theta = basis.column(c);
+            for o in 0..l {
+                let row = (n + o) * m + c;
+                for j in 0..n {
+                    forcing[(row, j)] = theta[layout.c() + o + l * j];
+                }
+                if layout.feedthrough {
+                    for j in 0..r {
+                        forcing[(row, n + j)] = theta[layout.d() + o + l * j];
+                    }
+                }
+            }
+            for i in 0..n {
+                let row = i * m + c;
+                for j in 0..n {
+                    forcing[(row, j)] = theta[i + n * j];
+                }
+                for j in 0..r {
+                    forcing[(row, n + j)] = theta[layout.b() + i + n * j];
+                }
+                for j in 0..l {
+                    forcing[(row, n + r + j)] = theta[layout.k() + i + n * j];
+                }
+                for o in 0..l {
+                    for j in 0..n + r {
+                        forcing[(row, j)] -= system.k[(i, o)] * forcing[((n + o) * m + c, j)];
+                    }
+                }
+            }
+        }
+        Self {
+            forcing,
+            predictor: system.predictor_matrix(),
+            directions: m,
+        }
+    }
+
+    /// Runs over the start-up and `samples` samples after it.
+    fn run(
+        &self,
+        system: &StateSpace,
+        record: &RecordView<'_>,
+        start: &Start,
+        samples: usize,
+    ) -> Segment {
+        let (n, r, l) = (system.states(), system.inputs(), system.outputs());
+        let m = self.directions;
+        let end = start.dropped + samples;
+        let mut z = Vec::with_capacity(samples * (r + l));
+        let mut psi = Vec::with_capacity(samples * l * m);
+        let mut x = start.state.clone();
+        let mut dx = vec![0.0; n * m];
+        let mut next = vec![0.0; n * m];
+        let mut from = 0;
+        while from < end {
+            let to = (from + BLOCK).min(end);
+            let mut operand = DMatrix::zeros(n + r + l, to - from);
+            for k in from..to {
+                let mut column = operand.column_mut(k - from);
+                column.rows_mut(0, n).copy_from(&x);
+                for j in 0..r {
+                    column[n + j] = record.inputs[j][k];
+                }
+                for o in 0..l {
+                    let mut e = record.outputs[o][k];
+                    for j in 0..n {
+                        e -= system.c[(o, j)] * x[j];
+                    }
+                    for j in 0..r {
+                        e -= system.d[(o, j)] * record.inputs[j][k];
+                    }
+                    column[n + r + o] = e;
+                }
+                let mut ahead = x.clone();
+                for i in 0..n {
+                    let mut sum = 0.0;
+                    for j in 0..n {
+                        sum += system.a[(i, j)] * x[j];
+                    }
+                    for j in 0..r {
+                        sum += system.b[(i, j)] * column[n + j];
+                    }
+                    for o in 0..l {
+                        sum += system.k[(i, o)] * column[n + r + o];
+                    }
+                    ahead[i] = sum;
+                }
+                x = ahead;
+            }
+            let forced = multiply(&self.forcing, &operand);
+            for k in from..to {
+                let force = forced.column(k - from);
+                let force = force.as_slice();
+                if k >= start.dropped {
+                    let values = operand.column(k - from);
+                    z.extend((0..r + l).map(|i| values[n + i] - start.means[i]));
+                    for o in 0..l {
+                        let at = psi.len();
+                        psi.extend(force[(n + o) * m..(n + o + 1) * m].iter().map(|v| -v));
+                        for j in 0..n {
+                            let c = system.c[(o, j)];
+                            for (p, d) in psi[at..].iter_mut().zip(&dx[j * m..(j + 1) * m]) {
+                                *p -= c * d;
+                            }
+                        }
+                    }
+                }
+                next.copy_from_slice(&force[..n * m]);
+                for i in 0..n {
+                    for j in 0..n {
+                        let a = self.predictor[(i, j)];
+                        let row = &mut next[i * m..(i + 1) * m];
+                        for (v, d) in row.iter_mut().zip(&dx[j * m..(j + 1) * m]) {
+                            *v += a * d;
+                        }
+                    }
+                }
+                std::mem::swap(&mut dx, &mut next);
+            }
+            from = to;
+        }
+        Segment { z, psi, samples }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::covariance::ParameterLayout;
+    use crate::systems::van_wingerden_one;
+
+    /// Filters against a difference quotient of the predictor itself.
+    #[test]
+    fn filters_are_the_derivative_of_the_innovations() {
+        let test = van_wingerden_one();
+        let mut system = test.system.clone();
+        system.d = DMatrix::from_row_slice(2, 2, &[0.3, -0.2, 0.1, 0.4]);
+        let log = test.record(80, 3);
+        let (u, y): (Vec<&[f64]>, Vec<&[f64]>) = (
+            log.input_data.iter().map(Vec::as_slice).collect(),
+            log.output_data.iter().map(Vec::as_slice).collect(),
+        );
+        let layout = ParameterLayout {
+            states: 4,
+            inputs: 2,
+            outputs: 2,
+            feedthrough: true,
+        };
+        let covariance = ParameterCovariance {
+            layout,
+            matrix: DMatrix::identity(layout.len(), layout.len()),
+            degrees_of_freedom: None,
+        };
+        let basis = DMatrix::identity(layout.len(), layout.len());
+        let start = Start {
+            state: nalgebra::DVector::zeros(4),
+            dropped: 5,
+            means: vec![0.0; 4],
+        };
+        let record = RecordView {
+            inputs: &u,
+            outputs: &y,
+        };
+        let segment = Filters::new(&system, &covariance, &basis).run(&system, &record, &start, 75);
+        let theta = layout.pack(&system);
+        let m = layout.len();
+        for parameter in 0..m {
+            let moved = |step: f64| {
+                let mut theta = theta.clone();
+                theta[parameter] += step;
+                let system = layout.unpack(&theta, &system);
+                system.one_step(&u, &y, None).unwrap().innovations
+            };
+            let (up, down) = (moved(1e-5), moved(-1e-5));
+            for k in [0, 20, 74] {
+                for o in 0..2 {
+                    let quotient = (up[o][k + 5] - down[o][k + 5]) / 2e-5;
+                    let found = segment.psi[(k * 2 + o) * m + parameter];
+                    assert!(
+                        (quotient - found).abs() < 1e-5 * (1.0 + quotient.abs()),
+                        "parameter {parameter}, sample {k}: {quotient} {found}"
+                    );
+                }
+            }
+        }
+        let innovations = system.one_step(&u, &y, None).unwrap().innovations;
+        assert!((segment.z[4 * 10 + 3] - innovations[1][15]).abs() < 1e-12);
+    }
+}

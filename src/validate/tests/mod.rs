@@ -1,0 +1,4 @@
+//! Tests of the whole judgement.
+
+mod false_alarms;
+mod support;

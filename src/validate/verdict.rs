@@ -1,0 +1,196 @@
+//! The verdict, and what it means in words.
+
+use super::options::Relation;
+use super::result::{ResidualTest, Validation};
+
+/// Explained shares below this are called small: they change a prediction by less than a tenth of the
+/// residual's size.
+const SMALL_SHARE: f64 = 0.01;
+
+/// Which of the tests reject at the family-wise level, by Holm's step-down procedure (1979, Scandinavian
+/// Journal of Statistics 6:65): the `i`-th smallest of `m` p-values is held against `level / (m - i)`.
+pub(super) fn holm(p_values: &[Option<f64>], level: f64) -> Vec<bool> {
+    let mut order: Vec<usize> = (0..p_values.len())
+        .filter(|&i| p_values[i].is_some())
+        .collect();
+    let value = |i: usize| p_values[i].unwrap_or(1.0);
+    order.sort_by(|&a, &b| value(a).total_cmp(&value(b)));
+    let mut rejected = vec![false; p_values.len()];
+    for (rank, &i) in order.iter().enumerate() {
+        if value(i) > level / (order.len() - rank) as f64 {
+            break;
+        }
+        rejected[i] = true;
+    }
+    rejected
+}
+
+/// Decides, and fills in `rejected` and `findings`. `noise_model`: whether the model claims one.
+pub(super) fn decide(validation: &mut Validation, noise_model: bool) {
+    let p = |test: &Option<ResidualTest>| test.as_ref().map(|t| t.p_value);
+    let fresh = validation.relation == Relation::Fresh;
+    let family = [
+        p(&validation.past_inputs),
+        p(&validation.whiteness).filter(|_| noise_model),
+        validation
+            .innovation_size
+            .as_ref()
+            .map(|size| size.p_value)
+            .filter(|_| fresh),
+    ];
+    let rejected = holm(&family, validation.level);
+    let level = validation.level;
+    let mut findings = Vec::new();
+
+    if let (Some(test), true) = (&validation.past_inputs, rejected[0]) {
+        findings.push(past_inputs_finding(test, noise_model));
+    }
+    if let (Some(test), true) = (&validation.whiteness, rejected[1]) {
+        findings.push(whiteness_finding(test));
+    }
+    if let (Some(size), true) = (&validation.innovation_size, rejected[2]) {
+        findings.extend(
+            size.outputs
+                .iter()
+                .filter(|output| output.p_value * size.outputs.len() as f64 <= level)
+                .map(|output| {
+                    let (ratio, than) = if output.ratio > output.expected_ratio {
+                        (output.ratio, "more")
+                    } else {
+                        (output.ratio, "less")
+                    };
+                    format!(
+                        "the residual of {} has {ratio:.3} times the variance that the model states, {than} \
+                         than chance allows: the noise of this recording differs from that of the \
+                         identification, or the plant has changed; identify again on data like these",
+                        output.output
+                    )
+                }),
+        );
+    }
+    validation.rejected = rejected.iter().any(|r| *r);
+    if !validation.rejected {
+        findings.push(if family.iter().all(Option::is_none) {
+            "no test of the residuals applies: judge the model by its fit".to_owned()
+        } else {
+            format!(
+                "nothing left to explain at the {} % level",
+                plain(100.0 * level)
+            )
+        });
+    }
+    if let (Some(test), false) = (&validation.whiteness, noise_model)
+        && test.p_value < level
+    {
+        findings.push(
+            "the simulation errors are coloured, which a model without noise model does not rule out; the test \
+             of past inputs allows for it"
+                .to_owned(),
+        );
+    }
+    if let Some(test) = &validation.feedback
+        && test.p_value < level
+    {
+        findings.push(
+            "past residuals act on the inputs: the recording was taken in closed loop, and only past inputs \
+             are tested"
+                .to_owned(),
+        );
+    }
+    if let Some(test) = &validation.same_sample
+        && test.p_value < level
+        && let Some(strongest) = &test.strongest
+    {
+        findings.push(format!(
+            "{} and {} move together within one sample (correlation {:.3}): either the plant has direct \
+             feedthrough (try --feedthrough), or a controller acts without delay",
+            strongest.from, strongest.to, strongest.correlation
+        ));
+    }
+    if let Some(reason) = &validation.free_run_unavailable {
+        findings.push(format!("no free run: {reason}"));
+    }
+    validation.findings = findings;
+}
+
+fn past_inputs_finding(test: &ResidualTest, noise_model: bool) -> String {
+    let cause = if noise_model {
+        "the order is too low or the plant is not linear; try a higher --order"
+    } else {
+        "the model misses part of what the inputs do (gain, dynamics or a nonlinearity)"
+    };
+    format!(
+        "past inputs predict {} of the residual variance{}: {cause}{}",
+        percent(test.explained_share),
+        most(test),
+        if test.explained_share < SMALL_SHARE {
+            ", if so small a part matters"
+        } else {
+            ""
+        }
+    )
+}
+
+fn whiteness_finding(test: &ResidualTest) -> String {
+    format!(
+        "past residuals predict {} of the residual variance{}: the noise model is not right, so the stated \
+         uncertainty is not either; try a higher --order or a longer --past, or use --covariance robust{}",
+        percent(test.explained_share),
+        most(test),
+        if test.explained_share < SMALL_SHARE {
+            " (the part is small)"
+        } else {
+            ""
+        }
+    )
+}
+
+fn most(test: &ResidualTest) -> String {
+    test.strongest.as_ref().map_or_else(String::new, |s| {
+        format!(", most at lag {} of {} -> {}", s.lag, s.from, s.to)
+    })
+}
+
+/// A share with two significant digits.
+fn percent(share: f64) -> String {
+    let value = 100.0 * share;
+    if value >= 10.0 {
+        format!("{value:.0} %")
+    } else if value >= 1.0 {
+        format!("{value:.1} %")
+    } else if value >= 0.01 {
+        format!("{value:.2} %")
+    } else {
+        "less than 0.01 %".to_owned()
+    }
+}
+
+fn plain(value: f64) -> String {
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn holm_steps_down() {
+        let reject = |p: [f64; 3], level| holm(&p.map(Some), level);
+        assert_eq!(reject([0.02, 0.5, 0.001], 0.05), [true, false, true]);
+        assert_eq!(reject([0.03, 0.04, 0.001], 0.05), [false, false, true]);
+        assert_eq!(reject([0.02, 0.02, 0.02], 0.05), [false, false, false]);
+        assert_eq!(holm(&[None, Some(0.04), None], 0.05), [false, true, false]);
+        assert_eq!(holm(&[None], 0.05), [false]);
+    }
+
+    #[test]
+    fn numbers_read_well() {
+        assert_eq!(percent(0.031), "3.1 %");
+        assert_eq!(percent(0.31), "31 %");
+        assert_eq!(percent(2e-4), "0.02 %");
+        assert_eq!(percent(0.0), "less than 0.01 %");
+        assert_eq!(plain(1.0), "1");
+        assert_eq!(plain(0.5), "0.5");
+    }
+}
