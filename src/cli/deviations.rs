@@ -93,7 +93,11 @@ impl Deviations {
             }
             let mut aligned = Aligned::new(model);
             records.read(experiment, Some(limit), &mut |block| aligned.push(block))?;
-            out.push(Self::new(aligned.columns, model, Zero::of_estimation(model)));
+            out.push(Self::new(
+                aligned.columns,
+                model,
+                Zero::of_estimation(model),
+            ));
         }
         Ok(out)
     }

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::deviations::{Deviations, judge};
 use super::numbers::{self, Window};
-use super::output::{Output, check_distinct, paths, print};
+use super::output::{Output, check_distinct, note, paths, print};
 use super::progress::Progress;
 use super::roles::RoleFlags;
 use super::terminal::style;
@@ -18,7 +18,7 @@ use crate::identify::{
 use crate::log::{Roles, Source};
 use crate::moments::Detrend;
 use crate::report::ModelDocument;
-use crate::report::text::{ModelText, model_text, verdict, wrapped};
+use crate::report::text::{ModelText, findings, model_text, verdict, wrapped};
 use crate::validate::{Relation, Validation};
 
 const EXAMPLE: &str = "Examples:
@@ -26,7 +26,7 @@ const EXAMPLE: &str = "Examples:
   innovant identify log.csv.gz --inputs voltage --outputs speed,current --output model.json
   innovant identify first.csv second.csv           two experiments of one plant
   innovant identify log.csv --order 2..8           compare orders
-  zcat logs/*.gz | innovant identify - --dt 0.01 --output - | jq .warnings";
+  ssh plant cat log.csv | innovant identify - --dt 0.01 --output - | jq .warnings";
 
 /// Identify a state-space model with its uncertainty from recordings
 ///
@@ -81,7 +81,12 @@ struct ModelFlags {
     #[arg(long)]
     feedthrough: bool,
     /// Known delay of the inputs in samples: one for all, or one for each
-    #[arg(long, value_name = "D[,D..]", value_delimiter = ',', allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "D[,D..]",
+        value_delimiter = ',',
+        allow_negative_numbers = true
+    )]
     delay: Vec<u32>,
     /// A stable model, guaranteed; the summary says what it cost
     #[arg(long)]
@@ -200,19 +205,19 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     progress.finish();
     if say.verbose {
         for recording in &model.recordings {
-            eprintln!(
-                "read {}: {} samples from {} s, sha256 {}",
+            note(&format!(
+                "read {}: {} samples from {} s, sha256 {}\n",
                 recording.name,
                 recording.samples,
                 recording.start_time,
                 recording.sha256.as_deref().unwrap_or("-")
-            );
+            ));
         }
-        eprintln!(
-            "read and fitted in {:.3} s, residuals tested in {:.3} s",
+        note(&format!(
+            "read and fitted in {:.3} s, residuals tested in {:.3} s\n",
             fitted.as_secs_f64(),
             (started.elapsed() - fitted).as_secs_f64()
-        );
+        ));
     }
     let table = |model: &Model, tests: Option<&Validation>| {
         let orders = match &plan.options.order {
@@ -231,7 +236,7 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         output.write(&document.to_json()?)?;
         if output.is_stdout() {
             if !say.quiet {
-                note(&model, tests.as_ref());
+                tell(&model, tests.as_ref());
             }
             return Ok(Outcome::Done);
         }
@@ -280,12 +285,12 @@ fn check_recorded_once(model: &Model) -> anyhow::Result<()> {
 }
 
 /// What a person should know when the table goes nowhere.
-fn note(model: &Model, tests: Option<&Validation>) {
-    eprint!("{}", wrapped("", &verdict(model, tests)));
+fn tell(model: &Model, tests: Option<&Validation>) {
+    note(&wrapped("", &verdict(model, tests)));
     for warning in model.summary.iter().flat_map(|s| &s.warnings) {
-        eprint!("{}", wrapped("warning: ", warning));
+        note(&wrapped("warning: ", warning));
     }
-    for finding in tests.iter().flat_map(|t| &t.findings) {
-        eprint!("{}", wrapped("finding: ", finding));
+    for finding in tests.iter().flat_map(|t| findings(t)) {
+        note(&wrapped("finding: ", &finding));
     }
 }

@@ -27,12 +27,13 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use crate::log::LogError;
 
 /// What is said above the list of commands.
-const ABOUT: &str = "State-space models with honest uncertainty from recordings, also in closed loop";
+const ABOUT: &str =
+    "State-space models with honest uncertainty from recordings, also in closed loop";
 
 /// What is said below it.
 const EXAMPLE: &str = "Example:
   innovant identify log.csv --output model.json    columns u* are inputs, y* outputs, t is time
-  innovant validate model.json fresh.csv           exit code 1 when the recording speaks against the model
+  innovant validate model.json fresh.csv           does the model hold on another recording?
   innovant simulate model.json input.csv > out.csv
   innovant show model.json
 
@@ -95,7 +96,7 @@ where
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             // The messages of the library hold their causes already.
-            eprintln!("error: {error}");
+            output::note(&format!("error: {error}\n"));
             ExitCode::from(2)
         }
     }

@@ -10,7 +10,8 @@ pub(super) fn order(text: &str) -> Result<Order, String> {
     if text == "auto" {
         return Ok(Order::Auto);
     }
-    let help = "expected `auto`, a number such as `4`, a list such as `2,4,6`, or a range such as `2..8`";
+    let help =
+        "expected `auto`, a number such as `4`, a list such as `2,4,6`, or a range such as `2..8`";
     let number = |text: &str| {
         let order: usize = text.trim().parse().map_err(|_| help.to_owned())?;
         match order {

@@ -13,6 +13,11 @@ pub(super) fn print(text: &str) -> io::Result<()> {
     stdout.flush()
 }
 
+/// Writes text to standard error; nobody reading it is no reason to stop.
+pub(super) fn note(text: &str) {
+    let _ = io::stderr().write_all(text.as_bytes());
+}
+
 /// A place for the result that was writable when the work began.
 #[derive(Debug)]
 pub(super) struct Output {
@@ -45,10 +50,12 @@ impl Output {
             }
         }
         let target = target.unwrap_or_else(|_| path.to_owned());
-        output.try_place(&target).map_err(|source| LogError::Write {
-            path: path.to_owned(),
-            source,
-        })?;
+        output
+            .try_place(&target)
+            .map_err(|source| LogError::Write {
+                path: path.to_owned(),
+                source,
+            })?;
         Ok(output)
     }
 
@@ -103,20 +110,27 @@ pub(super) fn paths(sources: &[Source]) -> Vec<&Path> {
         .collect()
 }
 
-/// Refuses a recording that is named twice, and standard input that is read twice.
+/// Refuses a recording that is named twice: its noise would count as information. Standard input can be read once.
 ///
 /// # Errors
 /// Says which.
 pub(super) fn check_distinct(sources: &[Source]) -> anyhow::Result<()> {
     for (index, source) in sources.iter().enumerate() {
         let same = |other: &&Source| match (source, *other) {
-            (Source::Path(a), Source::Path(b)) => match (fs::canonicalize(a), fs::canonicalize(b)) {
-                // A pipe may be named twice and is another one each time.
-                (Ok(a), Ok(b)) => a == b && a.is_file(),
-                _ => a == b,
-            },
+            (Source::Path(a), Source::Path(b)) => {
+                match (fs::canonicalize(a), fs::canonicalize(b)) {
+                    // A pipe may be named twice and is another one each time.
+                    (Ok(a), Ok(b)) => a == b && a.is_file(),
+                    _ => a == b,
+                }
+            }
             (a, b) => a == b,
         };
+        if *source == Source::Stdin && sources[..index].contains(source) {
+            anyhow::bail!(
+                "`-` is given twice, and standard input can be read only once: name a file"
+            );
+        }
         if sources[..index].iter().any(|other| same(&other)) {
             anyhow::bail!(
                 "{source} is given twice: its noise would count as twice the information; name each recording once"

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use nalgebra::DVector;
 
-use super::output::{Output, check_distinct, paths};
+use super::output::{Output, check_distinct, note, paths};
 use super::roles::RoleFlags;
 use super::validate::check_sampling;
 use super::{Outcome, Verbosity};
@@ -84,15 +84,15 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         None
     };
     if say.verbose {
-        let from = start.as_ref().map_or("zero".to_owned(), |x0| {
-            format!("{:?}", x0.as_slice())
-        });
-        eprintln!(
-            "{}: {} samples of {} s; initial state {from}",
+        let from = start
+            .as_ref()
+            .map_or("zero".to_owned(), |x0| format!("{:?}", x0.as_slice()));
+        note(&format!(
+            "{}: {} samples of {} s; initial state {from}\n",
             log.name,
             log.samples(),
             log.sample_time
-        );
+        ));
     }
     let mut outputs = model.system.simulate(&inputs, start.as_ref())?;
     check_finite(&model, &log, &outputs)?;
@@ -127,7 +127,11 @@ fn input_deviations(model: &Model, log: &Log) -> Vec<Vec<f64>> {
 
 fn initial_state(model: &Model, log: &Log, inputs: &[&[f64]]) -> anyhow::Result<DVector<f64>> {
     if log.output_data.len() != model.outputs.len() {
-        let wanted: Vec<String> = model.outputs.iter().map(|c| c.channel.to_string()).collect();
+        let wanted: Vec<String> = model
+            .outputs
+            .iter()
+            .map(|c| c.channel.to_string())
+            .collect();
         anyhow::bail!(
             "{}: --initial-state estimate needs the recorded outputs {} in this file, and they are not all there; \
              name them with --outputs, or start from --initial-state zero",
@@ -142,9 +146,6 @@ fn initial_state(model: &Model, log: &Log, inputs: &[&[f64]]) -> anyhow::Result<
         .map(|(channel, column)| column.iter().map(|y| y - channel.level).collect())
         .collect();
     let outputs: Vec<&[f64]> = outputs.iter().map(Vec::as_slice).collect();
-    // Before the longest delay the inputs are not known.
-    let delay = model.inputs.iter().map(|c| c.delay).max().unwrap_or(0);
-    let _ = delay;
     Ok(estimate_initial_state(
         &model.system,
         inputs,

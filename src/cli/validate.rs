@@ -80,9 +80,7 @@ struct ValidationDocument<'a> {
 
 pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     let mut sources = flags.logs.clone();
-    if flags.model.as_os_str() == "-" {
-        sources.push(Source::Stdin);
-    }
+    sources.insert(0, Source::from(flags.model.clone()));
     check_distinct(&sources)?;
     let model = read_model(&flags.model)?.model;
     if model.inputs.is_empty() {
@@ -150,7 +148,13 @@ pub(super) fn check_sampling(name: &str, model: &Model, log: &Log) -> anyhow::Re
 /// With `--inputs` and `--outputs` the columns are the same by construction; the units may still differ.
 fn check_experiment(first: &Log, log: &Log) -> anyhow::Result<()> {
     check_same_channels(&first.name, &first.inputs, &log.name, &log.inputs, "inputs")?;
-    check_same_channels(&first.name, &first.outputs, &log.name, &log.outputs, "outputs")?;
+    check_same_channels(
+        &first.name,
+        &first.outputs,
+        &log.name,
+        &log.outputs,
+        "outputs",
+    )?;
     Ok(())
 }
 

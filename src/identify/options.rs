@@ -17,6 +17,17 @@ pub enum Order {
     Compare(Vec<usize>),
 }
 
+impl Order {
+    /// The largest order asked for; 1 when the choice is free.
+    pub fn largest(&self) -> usize {
+        match self {
+            Self::Auto => 1,
+            Self::Fixed(n) => *n,
+            Self::Compare(list) => list.iter().copied().max().unwrap_or(1),
+        }
+    }
+}
+
 /// When the estimate is polished to maximum likelihood.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,

@@ -14,10 +14,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::stable::with_poles_inside;
 use super::varx::Varx;
 use crate::covariance::{ParameterCovariance, ParameterLayout};
 use crate::linalg::{
-    LinalgError, cholesky_upper, multiply, multiply_nt, multiply_tn, qr_thin,
+    LinalgError, cholesky_upper, eigen, multiply, multiply_nt, multiply_tn, qr_thin,
     solve_upper_transposed, spectral_radius, stabilising_observer_gain, svd_thin,
 };
 use crate::model::StateSpace;
@@ -356,8 +357,60 @@ impl Linearised {
     }
 }
 
-/// Polishes `start` against the vector ARX estimate. When `largest_radius` is given, steps that take the
-/// spectral radius of `A` beyond it are shortened.
+/// Derivative of the modulus of each eigenvalue of `A` that sits on the circle of `radius`, with respect to
+/// the parameters: `d|lambda| = Re(conj(lambda) / |lambda| w dA v)`. One row an eigenvalue, of a complex pair
+/// only one.
+fn boundary_gradient(
+    system: &StateSpace,
+    layout: &ParameterLayout,
+    radius: f64,
+) -> Result<DMatrix<f64>, LinalgError> {
+    let decomposition = eigen(&system.a)?;
+    let n = system.states();
+    let on_boundary: Vec<usize> = (0..n)
+        .filter(|&i| {
+            let value = decomposition.values[i];
+            value.im >= 0.0 && value.norm() > radius * (1.0 - 1e-9)
+        })
+        .collect();
+    Ok(DMatrix::from_fn(
+        on_boundary.len(),
+        layout.len(),
+        |row, p| {
+            if p >= n * n {
+                return 0.0;
+            }
+            let i = on_boundary[row];
+            let value = decomposition.values[i];
+            let change = decomposition.left[(i, p % n)] * decomposition.right[(p / n, i)];
+            (value.conj() / value.norm() * change).re
+        },
+    ))
+}
+
+/// The linearised problem, confined to the boundary of the stability radius where a free step would leave
+/// it (an active set: an eigenvalue that the step would take inward is let go).
+fn linearise(
+    jacobian: DMatrix<f64>,
+    residual: &[f64],
+    rank: usize,
+    boundary: &DMatrix<f64>,
+) -> Result<Linearised, LinalgError> {
+    let free = Linearised::new(&jacobian, residual, rank)?;
+    let outward = boundary * free.step(0.0);
+    let active: Vec<usize> = (0..boundary.nrows())
+        .filter(|&i| outward[i] > 0.0)
+        .collect();
+    if active.is_empty() {
+        return Ok(free);
+    }
+    let (normal, _) = qr_thin(&boundary.select_rows(&active).transpose());
+    let confined = &jacobian - (&jacobian * &normal) * normal.transpose();
+    Linearised::new(&confined, residual, rank - active.len())
+}
+
+/// Polishes `start` against the vector ARX estimate. When `largest_radius` is given, the spectral radius of
+/// `A` stays within it.
 ///
 /// # Errors
 /// [`LinalgError`] when the innovation covariance is singular (a noise-free record needs no polish) or
@@ -413,7 +466,11 @@ pub fn polish(
             });
         }
         let residual = problem.residual(&system);
-        let linearised = Linearised::new(&jacobian, residual.as_slice(), rank)?;
+        let boundary = match largest_radius {
+            Some(radius) => boundary_gradient(&system, &layout, radius)?,
+            None => DMatrix::zeros(0, layout.len()),
+        };
+        let linearised = linearise(jacobian, residual.as_slice(), rank, &boundary)?;
         if linearised.decrease() < DECREASE || flat == FLAT_STEPS {
             converged = true;
             break linearised.covariance();
@@ -430,13 +487,11 @@ pub fn polish(
                 .map(|(value, change)| value + length * change)
                 .collect();
             let candidate = layout.unpack(&moved, &system);
-            let inside = largest_radius
-                .is_none_or(|limit| spectral_radius(&candidate.a).is_ok_and(|r| r <= limit));
-            let candidate_cost = if inside {
-                problem.cost(&candidate)
-            } else {
-                f64::INFINITY
+            let candidate = match largest_radius {
+                Some(radius) => with_poles_inside(&candidate, radius).ok()?,
+                None => candidate,
             };
+            let candidate_cost = problem.cost(&candidate);
             (candidate_cost < cost).then_some((candidate, candidate_cost))
         });
         match better {
@@ -450,8 +505,8 @@ pub fn polish(
                 cost = candidate_cost;
             }
             None => {
-                // At the minimum to rounding, or held by the constraint.
-                converged = linearised.decrease() < GAIN * (1.0 + cost) || largest_radius.is_some();
+                // At the minimum to rounding.
+                converged = linearised.decrease() < GAIN * (1.0 + cost);
                 break linearised.covariance();
             }
         }

@@ -54,7 +54,6 @@ pub fn with_poles_inside(system: &StateSpace, radius: f64) -> Result<StateSpace,
 /// [`LinalgError`] from the polish, or for a defective `A`.
 pub fn stabilised(start: &StateSpace, varx: &Varx) -> Result<Polished, LinalgError> {
     let radius = largest_stable_radius(varx.columns);
-    // A little inside, so that rounding and the first steps stay within.
-    let inside = with_poles_inside(start, 1.0 - 1.5 * (1.0 - radius))?;
+    let inside = with_poles_inside(start, radius)?;
     polish(&inside, varx, Some(radius))
 }

@@ -27,7 +27,8 @@ mod triangular;
 
 pub use cholesky::{cholesky_upper, symmetric_square_root_factor};
 pub use eigen::{
-    Eigen, SymmetricEigen, eigen, eigenvalues, generalised_eigen, spectral_radius, symmetric_eigen,
+    Eigen, SymmetricEigen, eigen, eigenvalues, generalised_eigenvalues, spectral_radius,
+    symmetric_eigen,
 };
 pub use error::LinalgError;
 pub use lyapunov::{discrete_lyapunov, stabilising_observer_gain};

@@ -16,13 +16,10 @@ use num_complex::Complex64;
 use super::error::ModelError;
 use super::poles::{Pole, slowest_first};
 use super::state_space::StateSpace;
-use crate::linalg::{generalised_eigen, svd_thin};
+use crate::linalg::{generalised_eigenvalues, svd_thin};
 
 /// A zero farther out than this counts as infinite: its inverse is below what an estimated model holds.
 const FARTHEST: f64 = 1e8;
-
-/// Smallest order handed to the generalised eigenvalue problem.
-const SMALLEST_PENCIL: usize = 4;
 
 /// A zero whose left and right directions are closer to orthogonal than this is multiple to working
 /// precision, and has no derivative.
@@ -173,14 +170,7 @@ impl Pencil {
         let null = basis.columns(m, n);
         let states = null.rows(0, n).into_owned();
         let next = &self.a * &states + &self.b * null.rows(n, m);
-        // Zeros at infinity fill the pencil up to the order that faer 0.24 needs: its generalised
-        // eigenvalues panic below 3 (workspace too small).
-        let order = n.max(SMALLEST_PENCIL);
-        let mut left = DMatrix::identity(order, order);
-        left.view_mut((0, 0), (n, n)).copy_from(&next);
-        let right = states.resize(order, order, 0.0);
-        let (pairs, _) = generalised_eigen(&left, &right)?;
-        Ok(pairs
+        Ok(generalised_eigenvalues(&next, &states)?
             .into_iter()
             .filter(|(alpha, beta)| alpha.norm() < FARTHEST * beta.norm())
             .map(|(alpha, beta)| alpha / beta)

@@ -200,7 +200,8 @@ mod tests {
 
     #[test]
     fn empty_ones_stay_on_their_line() {
-        let text = to_json(&json!({"list": [], "map": {}, "nothing": null, "rows": [[], []]})).unwrap();
+        let text =
+            to_json(&json!({"list": [], "map": {}, "nothing": null, "rows": [[], []]})).unwrap();
         assert!(text.contains("\"list\": [],\n"));
         assert!(text.contains("\"map\": {},\n"));
         assert!(text.contains("\"rows\": [\n    [],\n    []\n  ]"));

@@ -119,7 +119,8 @@ fn walk(text: &str, end: usize, top_key: &mut dyn FnMut(&str, usize)) -> Vec<Ste
 mod tests {
     use super::*;
 
-    const TEXT: &str = "{\n  \"a, {\": [1, 2],\n  \"B\": [[1, 2],\n   [3, x]],\n \"c\": {\"d\": [{\"e\": 1}]}}";
+    const TEXT: &str =
+        "{\n  \"a, {\": [1, 2],\n  \"B\": [[1, 2],\n   [3, x]],\n \"c\": {\"d\": [{\"e\": 1}]}}";
 
     #[test]
     fn paths_are_followed_through_brackets_and_strings() {
@@ -132,7 +133,10 @@ mod tests {
 
     #[test]
     fn keys_have_a_place() {
-        assert_eq!(position_of(TEXT, "B"), Some(Position { line: 3, column: 3 }));
+        assert_eq!(
+            position_of(TEXT, "B"),
+            Some(Position { line: 3, column: 3 })
+        );
         assert_eq!(position_of(TEXT, "e"), None);
         assert_eq!(offset(TEXT, 3, 2), TEXT.find("\"B").unwrap());
     }

@@ -9,9 +9,7 @@ use super::json::to_json;
 use super::matrix::Rows;
 use super::packed::CovarianceDocument;
 use crate::covariance::{Root, StaticGain, invariants};
-use crate::identify::{
-    Asked, Diagnostics, Horizons, IdentifiedChannel, Model, Recording, Weight,
-};
+use crate::identify::{Asked, Diagnostics, Horizons, IdentifiedChannel, Model, Recording, Weight};
 use crate::model::Armax;
 use crate::validate::Validation;
 
@@ -256,7 +254,10 @@ fn check_finite(model: &Model) -> Result<(), DocumentError> {
         ("C", Some(&system.c)),
         ("D", Some(&system.d)),
         ("K", Some(&system.k)),
-        ("innovation_covariance", model.innovation_covariance.as_ref()),
+        (
+            "innovation_covariance",
+            model.innovation_covariance.as_ref(),
+        ),
         ("covariance", model.covariance.as_ref().map(|c| &c.matrix)),
     ];
     for (key, matrix) in matrices {

@@ -50,7 +50,8 @@ pub fn read_model(path: &Path) -> Result<ReadModel, DocumentError> {
         name: name.clone(),
         source,
     })?;
-    let text = String::from_utf8(bytes).map_err(|_| DocumentError::NotText { name: name.clone() })?;
+    let text =
+        String::from_utf8(bytes).map_err(|_| DocumentError::NotText { name: name.clone() })?;
     parse_model(&name, &text)
 }
 
@@ -211,10 +212,10 @@ fn model(document: &ModelDocument) -> Result<Model, (String, String)> {
         || DMatrix::zeros(c.nrows(), b.ncols()),
         |d| super::matrix::Rows(d).shaped(outputs, inputs),
     );
-    let k = document.k.clone().map_or_else(
-        || DMatrix::zeros(n, c.nrows()),
-        |k| k.shaped(n, outputs),
-    );
+    let k = document
+        .k
+        .clone()
+        .map_or_else(|| DMatrix::zeros(n, c.nrows()), |k| k.shaped(n, outputs));
     let system =
         StateSpace::new(a, b, c, d, k, document.sample_time).map_err(|error| match &error {
             ModelError::Shape { matrix, .. } | ModelError::NotFinite { matrix, .. } => {
@@ -314,10 +315,16 @@ fn channels<D: Clone>(
     }
     let channels: Vec<IdentifiedChannel> = named.iter().cloned().map(convert).collect();
     for (i, one) in channels.iter().enumerate() {
-        if channels[..i].iter().any(|other| other.channel.name == one.channel.name) {
+        if channels[..i]
+            .iter()
+            .any(|other| other.channel.name == one.channel.name)
+        {
             return Err((
                 key.to_owned(),
-                format!("two of them are called `{}`; names must differ", one.channel.name),
+                format!(
+                    "two of them are called `{}`; names must differ",
+                    one.channel.name
+                ),
             ));
         }
     }

@@ -60,11 +60,7 @@ pub(super) fn check(
     Ok(())
 }
 
-fn square(
-    what: &'static str,
-    matrix: &DMatrix<f64>,
-    expected: usize,
-) -> Result<(), ValidateError> {
+fn square(what: &'static str, matrix: &DMatrix<f64>, expected: usize) -> Result<(), ValidateError> {
     if matrix.shape() != (expected, expected) {
         return Err(ValidateError::Covariance {
             what,
@@ -104,11 +100,7 @@ fn shape(system: &StateSpace, record: &RecordView<'_>) -> Result<(), ModelError>
     Ok(())
 }
 
-fn finite(
-    column: &[f64],
-    record: usize,
-    name: impl Fn() -> String,
-) -> Result<(), ValidateError> {
+fn finite(column: &[f64], record: usize, name: impl Fn() -> String) -> Result<(), ValidateError> {
     // Zero times a finite number is zero, times anything else NaN: one sum that vectorises.
     let clean = column
         .chunks(4096)

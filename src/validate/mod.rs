@@ -128,8 +128,7 @@ pub fn validate(
     };
     let sensitivity = match covariance {
         Some(covariance) => {
-            let whole =
-                relation == Relation::Estimation && covariance.degrees_of_freedom.is_some();
+            let whole = relation == Relation::Estimation && covariance.degrees_of_freedom.is_some();
             let starts = &residuals.starts;
             Sensitivity::new(system, covariance, records, starts, past, whole)?
         }

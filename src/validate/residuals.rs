@@ -122,8 +122,8 @@ pub(super) fn residuals(
         let samples = record.samples();
         let head = samples.min(SAMPLES_FOR_INITIAL_STATE);
         let (u, y) = (cut(record.inputs, 0, head), cut(record.outputs, 0, head));
-        let state = estimate_initial_state(system, &u, &y, innovation_covariance)
-            .map_err(data_error)?;
+        let state =
+            estimate_initial_state(system, &u, &y, innovation_covariance).map_err(data_error)?;
         let mut predictor = Predictor::new(system, Some(&state)).map_err(data_error)?;
         let mut simulator = if bare || free_run.is_err() {
             None

@@ -235,7 +235,9 @@ impl Sensitivity {
             .iter()
             .map(|part| {
                 let difference = part - &cross;
-                multiply(&difference, &self.covariance).component_mul(&difference).sum()
+                multiply(&difference, &self.covariance)
+                    .component_mul(&difference)
+                    .sum()
             })
             .sum();
         let error = if count > 1.0 {
@@ -292,7 +294,11 @@ fn directions(
     whole_space: bool,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>, usize), ValidateError> {
     let matrix = &covariance.matrix;
-    let deviation: Vec<f64> = matrix.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect();
+    let deviation: Vec<f64> = matrix
+        .diagonal()
+        .iter()
+        .map(|v| v.max(0.0).sqrt())
+        .collect();
     let inverse = |i: usize| {
         if deviation[i] > 0.0 {
             1.0 / deviation[i]

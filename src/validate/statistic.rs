@@ -63,7 +63,10 @@ impl ScoreCovariance {
         relation: Relation,
     ) -> Result<Self, ValidateError> {
         let n = partial.samples as f64;
-        let loss = averages.information.component_mul(sensitivity.covariance()).sum();
+        let loss = averages
+            .information
+            .component_mul(sensitivity.covariance())
+            .sum();
         match relation {
             Relation::Fresh => {
                 let factor = crate::linalg::symmetric_square_root_factor(sensitivity.covariance())?;

@@ -12,6 +12,7 @@ mod verdict;
 pub use model_text::{ModelText, model_text};
 pub use orders::comparison;
 pub use show::show_text;
+pub(crate) use validation_text::findings;
 pub use validation_text::validation_text;
 pub use verdict::verdict;
 
@@ -34,7 +35,7 @@ impl Style {
 
 /// `text` in lines of at most [`WIDTH`] columns; the first starts with `first`, the others with as many spaces.
 pub(crate) fn wrapped(first: &str, text: &str) -> String {
-    let indent = first.chars().count();
+    let indent = first.chars().filter(|c| *c != '\n').count();
     let mut out = String::from(first);
     let mut column = indent;
     for (index, word) in text.split_whitespace().enumerate() {
@@ -67,7 +68,11 @@ mod tests {
     fn long_sentences_are_wrapped_and_indented() {
         let text = wrapped("warning: ", &"word ".repeat(60));
         assert!(text.lines().all(|line| line.chars().count() <= WIDTH));
-        assert!(text.lines().skip(1).all(|line| line.starts_with("         word")));
+        assert!(
+            text.lines()
+                .skip(1)
+                .all(|line| line.starts_with("         word"))
+        );
         assert_eq!(text.matches("word").count(), 60);
     }
 

@@ -97,7 +97,13 @@ pub(super) fn dynamics(model: &Model, described: &Invariants, style: Style) -> S
 
 /// Fit of each output.
 pub(super) fn fit(tests: &Validation) -> String {
-    let mut table = Table::new(["output", "one step ahead", "rms error", "free run", "rms error"]);
+    let mut table = Table::new([
+        "output",
+        "one step ahead",
+        "rms error",
+        "free run",
+        "rms error",
+    ]);
     for (index, one) in tests.one_step.outputs.iter().enumerate() {
         let free = tests.free_run.as_ref().and_then(|f| f.outputs.get(index));
         table.row([
@@ -126,7 +132,10 @@ fn how(summary: &Summary) -> String {
     } else {
         "not polished"
     };
-    let covariance = match (summary.options.covariance, summary.diagnostics.jackknife_blocks) {
+    let covariance = match (
+        summary.options.covariance,
+        summary.diagnostics.jackknife_blocks,
+    ) {
         (CovarianceKind::Model, _) => "covariance from the model".to_owned(),
         (CovarianceKind::Robust, Some(blocks)) => {
             format!("covariance from {blocks} blocks of the data (jackknife)")

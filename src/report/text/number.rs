@@ -105,7 +105,10 @@ mod tests {
         assert_eq!(pm(0.5, 1e-14), "0.5 +- 1e-14");
         assert_eq!(with_std(Some(1.0), Some(0.0), Style::ASCII), "1");
         assert_eq!(with_std(None, None, Style::ASCII), "-");
-        assert_eq!(with_std(Some(2.0), Some(0.1), Style::UNICODE), "2.00 ± 0.10");
+        assert_eq!(
+            with_std(Some(2.0), Some(0.1), Style::UNICODE),
+            "2.00 ± 0.10"
+        );
     }
 
     #[test]

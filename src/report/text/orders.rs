@@ -10,10 +10,12 @@ const NEIGHBOURS: usize = 2;
 /// The evidence around the chosen order, and on every order that was tested.
 pub(super) fn order_evidence(summary: &Summary) -> String {
     let chosen = summary.order;
-    let shown = |e: &&OrderEvidence| {
-        e.order.abs_diff(chosen) <= NEIGHBOURS || e.p_value.is_some()
-    };
-    table("Order", summary, summary.diagnostics.orders.iter().filter(shown))
+    let shown = |e: &&OrderEvidence| e.order.abs_diff(chosen) <= NEIGHBOURS || e.p_value.is_some();
+    table(
+        "Order",
+        summary,
+        summary.diagnostics.orders.iter().filter(shown),
+    )
 }
 
 /// The comparison of the orders that were asked for.

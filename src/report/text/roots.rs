@@ -26,11 +26,7 @@ pub(super) fn roots(title: &str, roots: &[Root], style: Style) -> String {
     for root in roots.iter().filter(|root| root.imag >= 0.0) {
         table.row([
             kind(root),
-            with_std(
-                root.natural_frequency_hz,
-                root.natural_frequency_std,
-                style,
-            ),
+            with_std(root.natural_frequency_hz, root.natural_frequency_std, style),
             with_std(
                 root.natural_frequency_hz.map(|f| f * TAU),
                 root.natural_frequency_std.map(|f| f * TAU),
@@ -143,6 +139,9 @@ pub(super) fn shortened(name: &str) -> String {
     if name.chars().count() <= LONGEST {
         name.to_owned()
     } else {
-        name.chars().take(LONGEST - 3).chain("...".chars()).collect()
+        name.chars()
+            .take(LONGEST - 3)
+            .chain("...".chars())
+            .collect()
     }
 }

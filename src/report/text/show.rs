@@ -32,11 +32,8 @@ pub fn show_text(
             out.push_str(&wrapped(&format!("  {name} = "), &list.join(" ")));
         }
     }
-    out.push_str(&noise(model));
-    out.push_str(&responses(
-        &described.frequency_response,
-        every_frequency,
-    ));
+    out.push_str(&noise(model, style));
+    out.push_str(&responses(&described.frequency_response, every_frequency));
     if let Some(summary) = &model.summary {
         for (index, warning) in summary.warnings.iter().enumerate() {
             if index == 0 {
@@ -49,9 +46,15 @@ pub fn show_text(
 }
 
 fn channels(model: &Model) -> String {
-    let mut table = Table::new(["channel", "unit", "role", "operating point", "delay [samples]"])
-        .flush_left(1)
-        .flush_left(2);
+    let mut table = Table::new([
+        "channel",
+        "unit",
+        "role",
+        "operating point",
+        "delay [samples]",
+    ])
+    .flush_left(1)
+    .flush_left(2);
     for (role, channels) in [("input", &model.inputs), ("output", &model.outputs)] {
         for channel in channels {
             table.row([
@@ -70,7 +73,7 @@ fn channels(model: &Model) -> String {
     format!("\nChannels\n{}", table.lines())
 }
 
-fn noise(model: &Model) -> String {
+fn noise(model: &Model, style: Style) -> String {
     let Some(covariance) = &model.innovation_covariance else {
         return String::new();
     };
@@ -82,10 +85,13 @@ fn noise(model: &Model) -> String {
         let spread = freedom.map(|nu| std / (2.0 * nu as f64).sqrt());
         table.row([
             shortened(&output.channel.name),
-            with_std(Some(std), spread, Style::ASCII),
+            with_std(Some(std), spread, style),
         ]);
     }
-    format!("\nInnovations (what one step ahead cannot foresee)\n{}", table.lines())
+    format!(
+        "\nInnovations (what one step ahead cannot foresee)\n{}",
+        table.lines()
+    )
 }
 
 fn responses(points: &[ResponsePoint], every_frequency: bool) -> String {

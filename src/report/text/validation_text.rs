@@ -38,26 +38,28 @@ pub fn validation_text(tests: &Validation) -> String {
     out
 }
 
-/// The findings as they are.
-pub(super) fn findings(tests: &Validation) -> Vec<String> {
-    tests.findings.clone()
+/// The findings but the one that the verdict is: nothing found.
+pub(crate) fn findings(tests: &Validation) -> Vec<String> {
+    let says_nothing = |finding: &&String| finding.starts_with("nothing left to explain");
+    let findings = tests.findings.iter();
+    findings.filter(|f| !says_nothing(f)).cloned().collect()
 }
 
 fn residual_tests(tests: &Validation) -> String {
     let mut table = Table::new([
-        "",
+        "explained by",
         "chi-square",
         "freedom",
         "p",
         "share",
-        "strongest",
+        "strongest correlation",
     ])
     .flush_left(5);
     let rows: [(&str, &Option<ResidualTest>); 4] = [
-        ("residuals on their own past", &tests.whiteness),
-        ("residuals on past inputs", &tests.past_inputs),
-        ("same sample (information)", &tests.same_sample),
-        ("inputs on past residuals (information)", &tests.feedback),
+        ("past residuals", &tests.whiteness),
+        ("past inputs", &tests.past_inputs),
+        ("same sample *", &tests.same_sample),
+        ("feedback *", &tests.feedback),
     ];
     for (name, test) in rows {
         let Some(test) = test else { continue };
@@ -69,7 +71,7 @@ fn residual_tests(tests: &Validation) -> String {
             percent(100.0 * test.explained_share),
             test.strongest.as_ref().map_or(String::new(), |s| {
                 format!(
-                    "{} -> {} lag {}: {:+.3} (99 % within {:.3})",
+                    "{} -> {}, lag {}: {:+.3} (bound {:.3})",
                     shortened(&s.from),
                     shortened(&s.to),
                     s.lag,
@@ -82,11 +84,15 @@ fn residual_tests(tests: &Validation) -> String {
     if table.is_empty() {
         return String::new();
     }
-    format!(
-        "\nTests of the residuals, {} (share: of the variance that is explained)\n{}",
-        count(tests.lags, "lag"),
-        table.lines()
-    )
+    let mut out = wrapped(
+        "\n",
+        &format!(
+            "Tests of the residuals, {} (share of their variance; bound of 99 % of right models; * information only)",
+            count(tests.lags, "lag")
+        ),
+    );
+    out.push_str(&table.lines());
+    out
 }
 
 fn sizes(tests: &Validation) -> String {

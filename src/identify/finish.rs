@@ -1,0 +1,263 @@
+//! The final model: polish or not, stability, covariance, summary, the user's units.
+
+use super::candidate::cost_p_value;
+use super::data::Data;
+use super::error::IdentifyError;
+use super::fit::Fit;
+use super::options::{CovarianceKind, Options, Order, Polish};
+use super::pbsid_opt::{Estimate, Weight, decompose, system_matrices};
+use super::polish::{Polished, coefficient_cost, polish};
+use super::scaling;
+use super::select::{Selection, Windowed};
+use super::stable::{largest_stable_radius, stabilised, with_poles_inside};
+use super::summary::{
+    Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
+};
+use super::truncation::LARGEST_FOR_POLISH;
+use super::varx::{Varx, varx};
+use super::warnings;
+use crate::covariance::{ParameterCovariance, jackknife_covariance, subspace_covariance};
+use crate::linalg::spectral_radius;
+use crate::model::StateSpace;
+
+/// Singular values that are reported.
+const SINGULAR_VALUES_KEPT: usize = 40;
+
+/// Everything decided before the final numbers.
+pub struct Chosen {
+    /// Data of the past window.
+    pub windowed: Windowed,
+    /// The order.
+    pub selection: Selection,
+    /// Evidence on the past windows.
+    pub past_windows: Vec<PastEvidence>,
+    /// How it was decided.
+    pub explanation: Vec<String>,
+}
+
+/// Makes the model out of what was chosen.
+///
+/// # Errors
+/// [`IdentifyError::NoStableModel`], or too few blocks for the jackknife.
+pub fn finish(options: &Options, data: &Data, chosen: Chosen) -> Result<Fit, IdentifyError> {
+    let Chosen {
+        windowed,
+        selection,
+        past_windows,
+        mut explanation,
+    } = chosen;
+    let Windowed { factor, varx } = windowed;
+    let Selection {
+        candidate,
+        decomposition,
+        weight,
+        future,
+        evidence,
+        explanation: order_explanation,
+        noise_free,
+    } = selection;
+    explanation.push(order_explanation);
+    let order = candidate.order;
+    let outputs = factor.outputs;
+
+    let use_polish = match options.polish {
+        Polish::Never => false,
+        Polish::Always => true,
+        Polish::Auto => candidate.truncation <= LARGEST_FOR_POLISH,
+    };
+    let polished = candidate.polished.filter(|_| use_polish);
+    let order_test = polished.as_ref().map(|p| OrderTest {
+        chi_square: p.cost,
+        degrees_of_freedom: p.degrees_of_freedom,
+        p_value: cost_p_value(
+            p.cost,
+            p.degrees_of_freedom,
+            outputs * varx.degrees_of_freedom(),
+        ),
+    });
+    let estimate = candidate.estimate;
+    let (mut system, mut covariance) = match &polished {
+        Some(p) => (p.system.clone(), p.covariance.clone()),
+        None => (
+            estimate.system.clone(),
+            subspace_covariance(&estimate, &varx)?,
+        ),
+    };
+
+    let mut stability = None;
+    if options.stable {
+        let made = make_stable(&system, &varx)?;
+        if let Some((stable, stable_covariance, cost)) = made {
+            system = stable;
+            covariance = stable_covariance.unwrap_or(covariance);
+            stability = cost;
+        }
+    }
+
+    let mut jackknife_blocks = None;
+    if options.covariance == CovarianceKind::Robust {
+        let replicates = replicates(
+            data,
+            options,
+            &Replicated {
+                estimate: &estimate,
+                system: &system,
+                polished: polished.is_some(),
+                past: factor.past,
+                future,
+                weight,
+            },
+        );
+        jackknife_blocks = Some(replicates.len());
+        let layout = covariance.layout;
+        let replicates: Vec<Vec<f64>> = replicates.iter().map(|s| layout.pack(s)).collect();
+        covariance = jackknife_covariance(layout, &replicates).ok_or_else(|| {
+            IdentifyError::Option(format!(
+                "--covariance robust needs at least 3 blocks of data, and only {} could be made: give a longer \
+                 recording, a smaller --past, or --covariance model",
+                replicates.len()
+            ))
+        })?;
+    }
+
+    let mut summary = Summary {
+        method: "pbsid-opt".to_owned(),
+        weight,
+        polished: polished.is_some(),
+        order,
+        horizons: Horizons {
+            past: factor.past,
+            future,
+        },
+        samples: data.samples,
+        degrees_of_freedom: varx.degrees_of_freedom(),
+        options: Asked {
+            order_automatic: !matches!(options.order, Order::Fixed(_)),
+            past_automatic: options.past.is_none(),
+            polish: options.polish,
+            covariance: options.covariance,
+            detrend: options.detrend,
+            feedthrough: options.feedthrough,
+            stable: options.stable,
+            seed: options.seed,
+        },
+        diagnostics: Diagnostics {
+            windows: varx.columns,
+            route: factor.route,
+            reciprocal_condition: factor.reciprocal_condition,
+            truncation: candidate
+                .truncation
+                .is_finite()
+                .then_some(candidate.truncation),
+            singular_values: decomposition
+                .singular_values
+                .iter()
+                .take(SINGULAR_VALUES_KEPT.max(order + 5))
+                .copied()
+                .collect(),
+            spectral_radius: spectral_radius(&system.a)?,
+            predictor_radius: spectral_radius(&(&system.a - &system.k * &system.c))?,
+            order_test,
+            orders: evidence,
+            past_windows,
+            stability,
+            jackknife_blocks,
+        },
+        explanation,
+        warnings: Vec::new(),
+    };
+    summary.warnings = warnings::of_fit(&summary, &varx, noise_free, options);
+    Ok(Fit {
+        system: scaling::system_in_user_units(&system, &data.scale),
+        covariance: scaling::covariance_in_user_units(&covariance, &data.scale),
+        innovation_covariance: scaling::innovation_in_user_units(
+            &varx.innovation_covariance,
+            &data.scale[factor.inputs..],
+        ),
+        levels: data.levels.clone(),
+        delays: data.delays().to_vec(),
+        first_trend: data.trend(0).clone(),
+        summary,
+    })
+}
+
+/// A stable system, its covariance when it was polished, and what it cost.
+type MadeStable = (
+    StateSpace,
+    Option<ParameterCovariance>,
+    Option<StabilityCost>,
+);
+
+/// `None` when the system is stable as it is.
+fn make_stable(system: &StateSpace, varx: &Varx) -> Result<Option<MadeStable>, IdentifyError> {
+    let limit = largest_stable_radius(varx.columns);
+    let radius = spectral_radius(&system.a)?;
+    if radius <= limit {
+        return Ok(None);
+    }
+    let (stable, covariance, cost) = match stabilised(system, varx) {
+        Ok(Polished {
+            system,
+            covariance,
+            cost,
+            ..
+        }) => (system, Some(covariance), Some(cost)),
+        // A noise-free record has no likelihood to polish.
+        Err(_) => (with_poles_inside(system, limit)?, None, None),
+    };
+    let now = spectral_radius(&stable.a)?;
+    if now.is_nan() || now >= 1.0 {
+        return Err(IdentifyError::NoStableModel {
+            order: system.states(),
+            spectral_radius: now,
+        });
+    }
+    // Against the best model of the same order without the constraint.
+    let free = polish(system, varx, None)
+        .map(|p| p.cost)
+        .or_else(|_| coefficient_cost(system, varx))
+        .unwrap_or(f64::NAN);
+    let stability = cost
+        .map(|cost| (cost - free).max(0.0))
+        .filter(|increase| increase.is_finite())
+        .map(|increase| StabilityCost {
+            spectral_radius_before: radius,
+            chi_square_increase: increase,
+            p_value: cost_p_value(
+                increase,
+                1,
+                varx.coefficients.nrows() * varx.degrees_of_freedom(),
+            ),
+        });
+    Ok(Some((stable, covariance, stability)))
+}
+
+/// What is estimated again without each block.
+struct Replicated<'a> {
+    estimate: &'a Estimate,
+    system: &'a StateSpace,
+    polished: bool,
+    past: usize,
+    future: usize,
+    weight: Weight,
+}
+
+/// The model without each block of the jackknife, all in the same basis: the map to the state stays that
+/// of all data, and the polish starts from the model of all data.
+fn replicates(data: &Data, options: &Options, of: &Replicated<'_>) -> Vec<StateSpace> {
+    data.factors_without_blocks(of.past)
+        .iter()
+        .filter_map(|part| {
+            let part_varx = varx(part, options.feedthrough).ok()?;
+            if of.polished {
+                return polish(of.system, &part_varx, None).ok().map(|p| p.system);
+            }
+            let decomposition = decompose(part, &part_varx, of.future, of.weight).ok()?;
+            let map = of.estimate.state_map.clone();
+            let time = of.system.sample_time;
+            system_matrices(part, &part_varx, &decomposition, map, time)
+                .ok()
+                .map(|e| e.system)
+        })
+        .collect()
+}
