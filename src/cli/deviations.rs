@@ -110,12 +110,11 @@ pub(super) fn judge(
     relation: Relation,
     level: Option<f64>,
 ) -> Result<Validation, ValidateError> {
-    let slices: Vec<(Vec<&[f64]>, Vec<&[f64]>)> = records
+    let inputs: Vec<Vec<&[f64]>> = records.iter().map(|r| as_slices(&r.inputs)).collect();
+    let outputs: Vec<Vec<&[f64]>> = records.iter().map(|r| as_slices(&r.outputs)).collect();
+    let views: Vec<RecordView<'_>> = inputs
         .iter()
-        .map(|record| (as_slices(&record.inputs), as_slices(&record.outputs)))
-        .collect();
-    let views: Vec<RecordView<'_>> = slices
-        .iter()
+        .zip(&outputs)
         .map(|(inputs, outputs)| RecordView { inputs, outputs })
         .collect();
     let default = ValidationOptions::default();

@@ -133,7 +133,7 @@ pub(super) fn check_distinct(sources: &[Source]) -> anyhow::Result<()> {
         }
         if sources[..index].iter().any(|other| same(&other)) {
             anyhow::bail!(
-                "{source} is given twice: its noise would count as twice the information; name each recording once"
+                "{source} is given twice: what it says would count twice; name each file once"
             );
         }
     }

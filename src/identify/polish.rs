@@ -27,8 +27,8 @@ use crate::model::StateSpace;
 /// far below what a standard deviation is (1).
 const DECREASE: f64 = 1e-9;
 /// A Gauss-Newton iteration that has not ended by then will not.
-const ITERATIONS: usize = 60;
-/// Steps that are tried in turn until one decreases the cost: length of the step, and Levenberg-Marquardt
+const ITERATIONS: usize = 100;
+/// Steps of which the one that decreases the cost most is taken: length of the step, and Levenberg-Marquardt
 /// damping relative to the largest singular value of the Jacobian. An order too high makes the Jacobian
 /// nearly singular, and only damping helps there.
 const TRIES: [(f64, f64); 9] = [
@@ -480,20 +480,24 @@ pub fn polish(
         }
         iterations += 1;
         let theta = layout.pack(&system);
-        let better = TRIES.iter().find_map(|&(length, damping)| {
-            let moved: Vec<f64> = theta
-                .iter()
-                .zip(linearised.step(damping).iter())
-                .map(|(value, change)| value + length * change)
-                .collect();
-            let candidate = layout.unpack(&moved, &system);
-            let candidate = match largest_radius {
-                Some(radius) => with_poles_inside(&candidate, radius).ok()?,
-                None => candidate,
-            };
-            let candidate_cost = problem.cost(&candidate);
-            (candidate_cost < cost).then_some((candidate, candidate_cost))
-        });
+        // A cost is cheap beside a Jacobian: try all, take the best.
+        let better = TRIES
+            .iter()
+            .filter_map(|&(length, damping)| {
+                let moved: Vec<f64> = theta
+                    .iter()
+                    .zip(linearised.step(damping).iter())
+                    .map(|(value, change)| value + length * change)
+                    .collect();
+                let candidate = layout.unpack(&moved, &system);
+                let candidate = match largest_radius {
+                    Some(radius) => with_poles_inside(&candidate, radius).ok()?,
+                    None => candidate,
+                };
+                let candidate_cost = problem.cost(&candidate);
+                (candidate_cost < cost).then_some((candidate, candidate_cost))
+            })
+            .min_by(|a, b| a.1.total_cmp(&b.1));
         match better {
             Some((candidate, candidate_cost)) => {
                 flat = if cost - candidate_cost < GAIN {

@@ -329,11 +329,11 @@ impl LagMoments {
             }
         }
         let indices = n as f64 * (n as f64 - 1.0) / 2.0;
-        for c in 0..q {
-            moved.sum[c] += n as f64 * shift[c];
-            moved.index_sum[c] += indices * shift[c];
+        for (c, shift) in shift.iter().enumerate() {
+            moved.sum[c] += n as f64 * shift;
+            moved.index_sum[c] += indices * shift;
             for value in moved.head[c].iter_mut().chain(moved.tail[c].iter_mut()) {
-                *value += shift[c];
+                *value += shift;
             }
         }
         moved

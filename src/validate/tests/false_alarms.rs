@@ -4,6 +4,18 @@ use super::support::*;
 use crate::systems::{servo, two_by_two, van_wingerden_one};
 use crate::validate::{Relation, Validation};
 
+fn z() -> crate::validate::ResidualTest {
+    crate::validate::ResidualTest {
+        statistic: 0.0,
+        degrees_of_freedom: 0,
+        fitted_directions: 0,
+        variance_inflation: 0.0,
+        p_value: 1.0,
+        explained_share: 0.0,
+        explained_share_by_channel: vec![],
+        strongest: None,
+    }
+}
 fn show(name: &str, studies: &[Validation]) {
     let n = studies.len() as f64;
     let rate = |f: &dyn Fn(&Validation) -> Option<f64>, a: f64| {
@@ -35,120 +47,74 @@ fn show(name: &str, studies: &[Validation]) {
         " rej {:.1} own {:.1} dof {:.1} {:.1} stat {:.1} {:.1} infl {:.2} share {:.4} {:.4}",
         100.0 * mean(&|v| f64::from(v.rejected)),
         mean(&|v| v.own_past_lags as f64),
-        mean(&|v| v.whiteness.as_ref().unwrap().degrees_of_freedom as f64),
-        mean(&|v| v.past_inputs.as_ref().unwrap().degrees_of_freedom as f64),
-        mean(&|v| v.whiteness.as_ref().unwrap().statistic),
-        mean(&|v| v.past_inputs.as_ref().unwrap().statistic),
-        mean(&|v| v.past_inputs.as_ref().unwrap().variance_inflation),
-        mean(&|v| v.whiteness.as_ref().unwrap().explained_share),
-        mean(&|v| v.past_inputs.as_ref().unwrap().explained_share),
+        mean(&|v| v.whiteness.clone().unwrap_or(z()).degrees_of_freedom as f64),
+        mean(&|v| v.past_inputs.clone().unwrap_or(z()).degrees_of_freedom as f64),
+        mean(&|v| v.whiteness.clone().unwrap_or(z()).statistic),
+        mean(&|v| v.past_inputs.clone().unwrap_or(z()).statistic),
+        mean(&|v| v.past_inputs.clone().unwrap_or(z()).variance_inflation),
+        mean(&|v| v.whiteness.clone().unwrap_or(z()).explained_share),
+        mean(&|v| v.past_inputs.clone().unwrap_or(z()).explained_share),
     );
 }
 
 #[test]
 fn explore() {
     let runs = 300;
-    let vw = van_wingerden_one();
-    let plants = [
-        ("vw", vw.clone(), 4, 1000),
-        ("servo", servo(), 3, 2000),
-        ("two", two_by_two(), 3, 1500),
-        ("vw5000", vw.clone(), 4, 5000),
-    ];
-    for (name, plant, order, n) in &plants {
+    use rayon::prelude::*;
+    for (plant, order, n) in [(two_by_two(), 3, 1500usize), (two_by_two(), 3, 6000)] {
+        let fits: Vec<_> = (0..runs)
+            .into_par_iter()
+            .map(|s| identified(&plant.record(n, s), order))
+            .collect();
         let t = std::time::Instant::now();
-        let fits: Vec<_> = {
-            use rayon::prelude::*;
-            (0..runs)
-                .into_par_iter()
-                .map(|s| identified(&plant.record(*n, s), *order))
-                .collect()
-        };
-        let tf = t.elapsed();
         show(
-            &format!("{name} est"),
+            "two est",
             &study(runs, |s| {
-                judged_fit(
-                    &fits[s as usize],
-                    &plant.record(*n, s),
-                    Relation::Estimation,
-                )
+                judged_fit(&fits[s as usize], &plant.record(n, s), Relation::Estimation)
             }),
         );
-        println!("fit {tf:?} with val {:?}", t.elapsed());
-        show(
-            &format!("{name} fresh"),
-            &study(runs, |s| {
-                judged_fit(
-                    &fits[s as usize],
-                    &plant.record(*n, s + 5000),
-                    Relation::Fresh,
-                )
-            }),
-        );
-        show(
-            &format!("{name} true"),
-            &study(runs, |s| {
-                judged(
-                    &plant.system,
-                    Some(&plant.innovation_covariance),
-                    None,
-                    &plant.record(*n, s),
-                    &[],
-                    Relation::Fresh,
-                )
-            }),
-        );
-        let system = bare(plant);
-        show(
-            &format!("{name} bare"),
-            &study(runs, |s| {
-                judged(
-                    &system,
-                    None,
-                    None,
-                    &plant.record(*n, s),
-                    &[],
-                    Relation::Fresh,
-                )
-            }),
-        );
-        let mut gain = plant.system.clone();
-        gain.b *= 1.2;
-        show(
-            &format!("{name} gain"),
-            &study(30, |s| {
-                judged(
-                    &gain,
-                    None,
-                    None,
-                    &plant.record(*n, s),
-                    &[],
-                    Relation::Fresh,
-                )
-            }),
-        );
-        let mut gain = bare(plant);
-        gain.b *= 1.2;
-        show(
-            &format!("{name} gain bare"),
-            &study(30, |s| {
-                judged(
-                    &gain,
-                    None,
-                    None,
-                    &plant.record(*n, s),
-                    &[],
-                    Relation::Fresh,
-                )
-            }),
-        );
-        show(
-            &format!("{name} order-1"),
-            &study(30, |s| {
-                let log = plant.record(*n, s);
-                judged_fit(&identified(&log, order - 1), &log, Relation::Estimation)
-            }),
+        println!("{:?}", t.elapsed());
+        for nn in [500, n, 20000] {
+            let t = std::time::Instant::now();
+            show(
+                &format!("two {n} fresh {nn}"),
+                &study(runs, |s| {
+                    judged_fit(
+                        &fits[s as usize],
+                        &plant.record(nn, s + 5000),
+                        Relation::Fresh,
+                    )
+                }),
+            );
+            println!("{:?}", t.elapsed());
+        }
+    }
+    let plant = van_wingerden_one();
+    let log = plant.record(1_000_000, 1);
+    let f = identified(&plant.record(5000, 3), 4);
+    for rel in [Relation::Fresh, Relation::Estimation] {
+        let t = std::time::Instant::now();
+        let v = judged_fit(&f, &log, rel);
+        println!("{:?} {} {:?}", t.elapsed(), v.rejected, v.findings);
+    }
+}
+#[test]
+fn timing() {
+    let plant = van_wingerden_one();
+    let log = plant.record(1_000_000, 1);
+    let f = identified(&plant.record(5000, 3), 4);
+    for rel in [Relation::Fresh, Relation::Estimation, Relation::Fresh] {
+        let t = std::time::Instant::now();
+        let v = judged_fit(&f, &log, rel);
+        println!(
+            "timing {:?} {} {:?} {:#?}",
+            t.elapsed(),
+            v.rejected,
+            v.findings,
+            v.past_inputs
         );
     }
+    let t = std::time::Instant::now();
+    let v = judged(&f.system, None, None, &log, &[], Relation::Fresh);
+    println!("without cov {:?}", t.elapsed());
 }

@@ -64,7 +64,7 @@ pub(super) fn judged_fit(fit: &Fit, log: &Log, relation: Relation) -> Validation
 }
 
 /// Runs `judge` for many seeds.
-pub(super) fn study(runs: u64, judge: impl Fn(u64) -> Validation + Sync) -> Vec<Validation> {
+pub(super) fn study(runs: u64, judge: impl Fn(u64) -> Validation + Send + Sync) -> Vec<Validation> {
     (0..runs).into_par_iter().map(judge).collect()
 }
 
