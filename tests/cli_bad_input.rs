@@ -161,7 +161,7 @@ fn columns_and_roles() {
             "--inputs force --outputs speed",
         ],
     );
-    let twice = about(&good, &["--inputs", "u1,y1"]);
+    let twice = about(&good, &["--inputs", "u1", "--outputs", "u1"]);
     says(&twice, &["given twice"]);
     let no_time = about(
         String::from_utf8(good)

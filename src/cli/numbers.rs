@@ -65,6 +65,14 @@ pub(super) fn seconds(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a positive number of seconds, such as 0.01".to_owned())
 }
 
+/// A level of significance.
+pub(super) fn level(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|value: &f64| *value > 0.0 && *value < 0.5)
+        .ok_or_else(|| "expected a probability between 0 and 0.5, such as 0.01".to_owned())
+}
+
 /// A frequency in rad/s, zero included.
 pub(super) fn frequency(text: &str) -> Result<f64, String> {
     text.trim()

@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::deviations::{Deviations, Zero, judge};
+use super::numbers;
 use super::output::{check_distinct, print};
 use super::roles::RoleFlags;
 use super::{Outcome, Verbosity};
@@ -43,7 +44,7 @@ pub(super) struct Flags {
     #[arg(long, value_enum)]
     detrend: Option<DetrendFlag>,
     /// Probability that a right model is rejected
-    #[arg(long, default_value_t = 0.01, value_name = "P")]
+    #[arg(long, default_value = "0.01", value_name = "P", value_parser = numbers::level)]
     level: f64,
     /// How to print the result
     #[arg(long, value_enum, default_value = "text")]

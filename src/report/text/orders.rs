@@ -41,7 +41,7 @@ fn table<'a>(
         "freedom",
         "p",
         "Schwarz",
-        "radius",
+        "spectral radius",
     ]);
     let number = |value: Option<f64>, digits: usize| {
         value.map_or("-".to_owned(), |value| significant(value, digits))

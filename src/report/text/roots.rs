@@ -117,7 +117,7 @@ pub(super) fn static_gains(
                 .map_or("infinite (integrator)".to_owned(), |value| {
                     with_std(Some(value), gain.standard_deviation, style)
                 }),
-            units,
+            shortened(&units),
         ]);
     }
     if table.is_empty() {
@@ -135,7 +135,7 @@ pub(super) fn static_gains(
 
 /// A name that leaves room for the numbers.
 pub(super) fn shortened(name: &str) -> String {
-    const LONGEST: usize = WIDTH / 4;
+    const LONGEST: usize = WIDTH / 5;
     if name.chars().count() <= LONGEST {
         name.to_owned()
     } else {

@@ -59,7 +59,7 @@ fn channels(model: &Model) -> String {
         for channel in channels {
             table.row([
                 shortened(&channel.channel.name),
-                channel.channel.unit.clone().unwrap_or_default(),
+                shortened(channel.channel.unit.as_deref().unwrap_or_default()),
                 role.to_owned(),
                 significant(channel.level, 6),
                 if channel.delay > 0 {

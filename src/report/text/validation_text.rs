@@ -38,23 +38,25 @@ pub fn validation_text(tests: &Validation) -> String {
     out
 }
 
-/// The findings but the one that the verdict is: nothing found.
+/// The findings but those that the tables say already: that nothing was found, why there is no free run.
 pub(crate) fn findings(tests: &Validation) -> Vec<String> {
-    let says_nothing = |finding: &&String| finding.starts_with("nothing left to explain");
-    let findings = tests.findings.iter();
-    findings.filter(|f| !says_nothing(f)).cloned().collect()
+    let said = ["nothing left to explain", "no free run: "];
+    let new = |finding: &&String| !said.iter().any(|said| finding.starts_with(said));
+    tests.findings.iter().filter(new).cloned().collect()
 }
 
 fn residual_tests(tests: &Validation) -> String {
-    let mut table = Table::new([
+    let mut table = Table::new(["explained by", "chi-square", "freedom", "p", "share"]);
+    let mut strongest = Table::new([
         "explained by",
-        "chi-square",
-        "freedom",
-        "p",
-        "share",
-        "strongest correlation",
+        "from",
+        "to",
+        "lag",
+        "correlation",
+        "99 % bound",
     ])
-    .flush_left(5);
+    .flush_left(1)
+    .flush_left(2);
     let rows: [(&str, &Option<ResidualTest>); 4] = [
         ("past residuals", &tests.whiteness),
         ("past inputs", &tests.past_inputs),
@@ -69,30 +71,29 @@ fn residual_tests(tests: &Validation) -> String {
             test.degrees_of_freedom.to_string(),
             probability(test.p_value),
             percent(100.0 * test.explained_share),
-            test.strongest.as_ref().map_or(String::new(), |s| {
-                format!(
-                    "{} -> {}, lag {}: {:+.3} (bound {:.3})",
-                    shortened(&s.from),
-                    shortened(&s.to),
-                    s.lag,
-                    s.correlation,
-                    s.bound_99
-                )
-            }),
+        ]);
+        let Some(most) = &test.strongest else {
+            continue;
+        };
+        strongest.row([
+            name.to_owned(),
+            shortened(&most.from),
+            shortened(&most.to),
+            most.lag.to_string(),
+            format!("{:+.3}", most.correlation),
+            format!("{:.3}", most.bound_99),
         ]);
     }
     if table.is_empty() {
         return String::new();
     }
-    let mut out = wrapped(
-        "\n",
-        &format!(
-            "Tests of the residuals, {} (share of their variance; bound of 99 % of right models; * information only)",
-            count(tests.lags, "lag")
-        ),
-    );
-    out.push_str(&table.lines());
-    out
+    format!(
+        "\nTests of the residuals, {} (share: of their variance; * for information)\n{}\
+         \nStrongest correlations\n{}",
+        count(tests.lags, "lag"),
+        table.lines(),
+        strongest.lines()
+    )
 }
 
 fn sizes(tests: &Validation) -> String {

@@ -36,7 +36,8 @@ fn judgement(summary: &Summary, tests: Option<&Validation>) -> String {
         .and_then(|test| test.p_value)
         .is_some_and(|p| p < ORDER_TEST_LEVEL);
     let vanished = tests.is_some_and(|t| t.whiteness.is_none() && t.past_inputs.is_none());
-    let main = if tests.is_some_and(|t| t.rejected) {
+    let rejected = tests.is_some_and(|t| t.rejected);
+    let main = if rejected {
         "rejected, the recording holds more than it explains"
     } else if order_too_low {
         "the recording holds more than it explains"
@@ -51,6 +52,7 @@ fn judgement(summary: &Summary, tests: Option<&Validation>) -> String {
         0 => main.to_owned(),
         // The verdict says already what this one warns of.
         1 if order_too_low => main.to_owned(),
+        n if rejected || order_too_low => format!("{main}; see {}", count(n, "warning")),
         n => format!("{main}, but see {}", count(n, "warning")),
     }
 }

@@ -1,0 +1,174 @@
+//! Does the stated uncertainty hold? 300 recordings of Example I (repaired), in closed loop, default settings:
+//! how often the 95 % and 99 % regions of frequency response and poles hold the truth.
+//!
+//! `cargo test --release --test monte_carlo -- --nocapture` prints the table.
+
+use innovant::covariance::{
+    Covariance2, ellipse_quantile, frequency_response_covariance, interval_quantile,
+    pole_uncertainties,
+};
+use innovant::identify::{CovarianceKind, Order, Polish};
+use innovant::systems::{TestSystem, servo, van_wingerden_one};
+use innovant::{Model, Options, identify};
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+const RUNS: u64 = 300;
+
+#[derive(Default, Clone, Copy)]
+struct Count {
+    inside_95: usize,
+    inside_99: usize,
+    total: usize,
+}
+
+impl Count {
+    fn ellipse(&mut self, error: Complex64, covariance: &Covariance2, freedom: Option<f64>) {
+        let [[a, b], [_, d]] = *covariance;
+        let determinant = a * d - b * b;
+        let square = (d * error.re * error.re - 2.0 * b * error.re * error.im
+            + a * error.im * error.im)
+            / determinant;
+        self.square(square, ellipse_quantile(0.95, freedom), ellipse_quantile(0.99, freedom));
+    }
+
+    fn square(&mut self, square: f64, at_95: f64, at_99: f64) {
+        self.total += 1;
+        self.inside_95 += usize::from(square <= at_95);
+        self.inside_99 += usize::from(square <= at_99);
+    }
+
+    fn add(&mut self, other: &Count) {
+        self.inside_95 += other.inside_95;
+        self.inside_99 += other.inside_99;
+        self.total += other.total;
+    }
+
+    fn shares(&self) -> (f64, f64) {
+        let share = |inside: usize| 100.0 * inside as f64 / self.total as f64;
+        (share(self.inside_95), share(self.inside_99))
+    }
+}
+
+/// Frequency response (complex ellipse), its magnitude (on a logarithmic scale), poles.
+fn coverage(plant: &TestSystem, model: &Model, frequencies: &[f64]) -> [Count; 3] {
+    let covariance = model.covariance.as_ref().unwrap();
+    let freedom = covariance.degrees_of_freedom;
+    let mut counts = [Count::default(); 3];
+    for &w in frequencies {
+        let truth = plant.system.frequency_response(w);
+        let found = model.system.frequency_response(w);
+        let spread = frequency_response_covariance(&model.system, covariance, w).unwrap();
+        for (index, g) in found.iter().enumerate() {
+            let error = truth[index] - g;
+            counts[0].ellipse(error, &spread[index], freedom);
+            let [[a, b], [_, d]] = spread[index];
+            let (c, s) = (g.re / g.norm(), g.im / g.norm());
+            let variance = (a * c * c + 2.0 * b * c * s + d * s * s) / g.norm_sqr();
+            let square = (truth[index].norm() / g.norm()).ln().powi(2) / variance;
+            let limit = |level| interval_quantile(level, freedom).powi(2);
+            counts[1].square(square, limit(0.95), limit(0.99));
+        }
+    }
+    let truth = plant.system.poles().unwrap();
+    for pole in pole_uncertainties(&model.system, covariance).unwrap() {
+        let value = pole.pole.value;
+        if value.im <= 1e-9 {
+            continue;
+        }
+        let nearest = truth
+            .iter()
+            .map(|p| p.value - value)
+            .min_by(|a, b| a.norm().total_cmp(&b.norm()))
+            .unwrap();
+        counts[2].ellipse(nearest, &pole.covariance.unwrap(), freedom);
+    }
+    counts
+}
+
+fn study(
+    name: &str,
+    plant: &TestSystem,
+    samples: usize,
+    options: &Options,
+    frequencies: &[f64],
+    runs: u64,
+) -> [(f64, f64); 3] {
+    let counts = (0..runs)
+        .into_par_iter()
+        .map(|run| {
+            let model = identify(&[plant.record(samples, 1000 + run)], options).unwrap();
+            coverage(plant, &model, frequencies)
+        })
+        .reduce(
+            || [Count::default(); 3],
+            |mut a, b| {
+                for (a, b) in a.iter_mut().zip(&b) {
+                    a.add(b);
+                }
+                a
+            },
+        );
+    let shares = counts.map(|c| c.shares());
+    println!(
+        "{name:<44} G {:.1} / {:.1}   |G| {:.1} / {:.1}   poles {:.1} / {:.1}   (95 / 99 %, {runs} runs)",
+        shares[0].0, shares[0].1, shares[1].0, shares[1].1, shares[2].0, shares[2].1
+    );
+    shares
+}
+
+const FREQUENCIES: [f64; 8] = [0.1, 0.3, 0.6, 0.785, 1.2, 1.8, 2.36, 3.0];
+
+#[test]
+fn default_settings_cover_in_closed_loop() {
+    let plant = van_wingerden_one();
+    let name = "Example I, N = 2000, default";
+    let shares = study(name, &plant, 2000, &Options::default(), &FREQUENCIES, RUNS);
+    for (at_95, at_99) in shares {
+        assert!((93.0..=97.0).contains(&at_95), "{at_95}");
+        assert!((97.5..=99.7).contains(&at_99), "{at_99}");
+    }
+}
+
+#[test]
+fn plain_subspace_estimate_covers_too() {
+    let plant = van_wingerden_one();
+    let options = Options {
+        order: Order::Fixed(4),
+        past: Some(10),
+        polish: Polish::Never,
+        ..Options::default()
+    };
+    let name = "Example I, N = 2000, p = 10, no polish";
+    for (at_95, at_99) in study(name, &plant, 2000, &options, &FREQUENCIES, RUNS) {
+        assert!((92.5..=97.0).contains(&at_95), "{at_95}");
+        assert!((97.3..=99.7).contains(&at_99), "{at_99}");
+    }
+}
+
+#[test]
+fn slow_plant_with_coloured_noise_covers() {
+    let plant = servo();
+    // 1 kHz: from a tenth of the slow pole to a decade above the resonance.
+    let frequencies: Vec<f64> = [1.0, 5.0, 10.0, 30.0, 80.0, 120.0, 200.0, 600.0].into();
+    let name = "servo, N = 4000, default";
+    for (at_95, at_99) in study(name, &plant, 4000, &Options::default(), &frequencies, 60) {
+        assert!((91.0..=98.0).contains(&at_95), "{at_95}");
+        assert!((96.0..=100.0).contains(&at_99), "{at_99}");
+    }
+}
+
+/// The jackknife has 18 or more degrees of freedom, and its regions take Student and F quantiles.
+#[test]
+fn robust_covariance_covers() {
+    let plant = van_wingerden_one();
+    let options = Options {
+        covariance: CovarianceKind::Robust,
+        ..Options::default()
+    };
+    let name = "Example I, N = 4000, --covariance robust";
+    for (at_95, at_99) in study(name, &plant, 4000, &options, &FREQUENCIES, 100) {
+        assert!((91.0..=98.0).contains(&at_95), "{at_95}");
+        assert!((96.5..=99.9).contains(&at_99), "{at_99}");
+    }
+}
