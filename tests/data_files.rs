@@ -14,7 +14,11 @@ fn recordings_are_those_of_the_test_systems() {
         for (number, (a, b)) in stored.lines().zip(made.lines()).enumerate().skip(1) {
             for (x, y) in a.split(',').zip(b.split(',')) {
                 let (x, y): (f64, f64) = (x.parse().unwrap(), y.parse().unwrap());
-                assert!((x - y).abs() <= 1.1e-4 * x.abs().max(1.0), "{name} line {}", number + 1);
+                assert!(
+                    (x - y).abs() <= 1.1e-4 * x.abs().max(1.0),
+                    "{name} line {}",
+                    number + 1
+                );
             }
         }
         let note = folder.join(name.replace("_check", "").replace(".csv", ".md"));

@@ -29,7 +29,11 @@ impl Count {
         let square = (d * error.re * error.re - 2.0 * b * error.re * error.im
             + a * error.im * error.im)
             / determinant;
-        self.square(square, ellipse_quantile(0.95, freedom), ellipse_quantile(0.99, freedom));
+        self.square(
+            square,
+            ellipse_quantile(0.95, freedom),
+            ellipse_quantile(0.99, freedom),
+        );
     }
 
     fn square(&mut self, square: f64, at_95: f64, at_99: f64) {

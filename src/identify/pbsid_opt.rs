@@ -9,11 +9,14 @@ use nalgebra::DMatrix;
 use super::error::IdentifyError;
 use super::varx::Varx;
 use crate::linalg::{
-    cholesky_upper, multiply, multiply_nt, multiply_tn, qr_thin, solve_upper,
+    cholesky_upper, multiply, multiply_nt, multiply_tn, pseudo_inverse, qr_thin, solve_upper,
     solve_upper_transposed, svd_thin,
 };
 use crate::model::StateSpace;
 use crate::moments::RFactor;
+
+/// Relative size below which a regressor is dependent on the others, or zero, to working precision.
+const DEPENDENT: f64 = 1e-11;
 
 /// Weight `W` of the singular value decomposition (28).
 #[derive(
@@ -183,20 +186,18 @@ pub fn system_matrices(
     let mut next = DMatrix::zeros(n, total);
     next.view_mut((0, q), (n, width)).copy_from(&state);
 
-    let (q2, r2) = qr_thin(&multiply_nt(&factor.r, &phi));
-    check_rank(&r2, "[xhat; u; ehat]")?;
     let next_state = multiply_nt(&factor.r, &next);
-    let abk = solve_upper(&r2, &multiply_tn(&q2, &next_state)).transpose();
+    let state_inverse = left_inverse(&multiply_nt(&factor.r, &phi), n + inputs, "[xhat; u]")?;
+    let abk = multiply(&state_inverse, &next_state).transpose();
 
     let rows = if varx.feedthrough { n + inputs } else { n };
-    let (q3, r3) = qr_thin(&multiply_nt(&factor.r, &phi.rows(0, rows).into_owned()));
-    check_rank(&r3, "xhat")?;
+    let of_output = multiply_nt(&factor.r, &phi.rows(0, rows).into_owned());
+    let output_inverse = left_inverse(&of_output, rows, "xhat")?;
     let output_columns = factor.r.columns(total - outputs, outputs).into_owned();
-    let cd = solve_upper(&r3, &multiply_tn(&q3, &output_columns)).transpose();
+    let cd = multiply(&output_inverse, &output_columns).transpose();
 
-    // zeta Phi^+ = R' Q2 R2'^-1.
-    let regression =
-        |q: &DMatrix<f64>, r: &DMatrix<f64>| solve_upper(r, &multiply_tn(q, &factor.r)).transpose();
+    // zeta Phi^+ = R' (R Phi')^+'.
+    let regression = |inverse: &DMatrix<f64>| multiply(inverse, &factor.r).transpose();
     let past_state = multiply_nt(&factor.r.view((0, 0), (width, width)).into_owned(), &state);
     Ok(Estimate {
         system: StateSpace {
@@ -211,17 +212,30 @@ pub fn system_matrices(
             },
             sample_time,
         },
-        state_regression: regression(&q2, &r2),
-        output_regression: regression(&q3, &r3),
+        state_regression: regression(&state_inverse),
+        output_regression: regression(&output_inverse),
         state_covariance: multiply_tn(&past_state, &past_state) / factor.columns as f64,
         state_map,
     })
 }
 
-fn check_rank(r: &DMatrix<f64>, what: &'static str) -> Result<(), IdentifyError> {
+/// `M^+` of a tall matrix whose first `essential` columns must be independent. The others are residuals, which
+/// vanish in a noise-free record: directions that they leave open get the minimum-norm solution (`K = 0`).
+fn left_inverse(
+    matrix: &DMatrix<f64>,
+    essential: usize,
+    what: &'static str,
+) -> Result<DMatrix<f64>, IdentifyError> {
+    let (q, r) = qr_thin(matrix);
     let largest = r.amax();
-    if r.nrows() < r.ncols() || (0..r.ncols()).any(|i| r[(i, i)].abs() <= 1e-14 * largest) {
+    let full = |columns: usize| {
+        r.nrows() >= columns && (0..columns).all(|i| r[(i, i)].abs() > DEPENDENT * largest)
+    };
+    if full(r.ncols()) {
+        return Ok(solve_upper(&r, &q.transpose()));
+    }
+    if !full(essential) {
         return Err(IdentifyError::SingularRegression { what });
     }
-    Ok(())
+    Ok(pseudo_inverse(matrix, DEPENDENT)?)
 }

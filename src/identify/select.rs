@@ -206,6 +206,10 @@ fn note(evidence: &mut Vec<OrderEvidence>, candidate: &Candidate, varx: &Varx) {
     entry.schwarz = Some(polished.cost + parameters * (varx.columns as f64).ln());
 }
 
+fn schwarz(evidence: &[OrderEvidence], order: usize) -> Option<f64> {
+    evidence.iter().find(|e| e.order == order)?.schwarz
+}
+
 fn best_by_schwarz(
     evidence: &[OrderEvidence],
     among: impl Fn(&OrderEvidence) -> bool,
@@ -237,17 +241,26 @@ fn choose_order(
     let first = tested(evidence, proposal);
     if first.is_none() || accepts(first) {
         let mut order = proposal;
-        while order > 1 && accepts(tested(evidence, order - 1)) {
+        while order > 1 {
+            let fewer = tested(evidence, order - 1);
+            // The test of the whole model may accept what a comparison with one state more would not.
+            let better = match (schwarz(evidence, order - 1), schwarz(evidence, order)) {
+                (Some(fewer), Some(more)) => fewer <= more,
+                _ => true,
+            };
+            if !accepts(fewer) || !better {
+                break;
+            }
             order -= 1;
         }
         let reason = if order < proposal {
-            "the smallest that the chi-square test accepts"
+            "the smallest that the chi-square test accepts and the Schwarz criterion does not regret"
         } else if first.is_none() {
             "smallest singular value criterion"
         } else if order == 1 {
             "smallest singular value criterion, and the chi-square test accepts it"
         } else {
-            "smallest singular value criterion, and the chi-square test accepts it but not one state less"
+            "smallest singular value criterion; the chi-square test accepts it, and one state less is worse"
         };
         return (order, format!("order {order}: {reason}"));
     }

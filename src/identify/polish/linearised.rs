@@ -1,0 +1,136 @@
+//! The linearised problem: steps and covariance in the singular directions of the Jacobian, confined to the
+//! boundary of the stability radius where it is active.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::covariance::ParameterLayout;
+use crate::linalg::{LinalgError, eigen, multiply_nt, multiply_tn, qr_thin, svd_thin};
+use crate::model::StateSpace;
+
+/// Singular values of the Jacobian below this share of the largest are not determined by the data.
+const DETERMINED: f64 = 1e-13;
+
+/// The linearised problem in the singular directions of its Jacobian: minimum-norm Gauss-Newton and damped
+/// steps, and the pseudo-inverse of the information, all of the rank that the input-output behaviour
+/// determines.
+pub struct Linearised {
+    /// Right singular vectors, one column a direction.
+    directions: DMatrix<f64>,
+    /// Singular values.
+    values: Vec<f64>,
+    /// Residual along the left singular vectors.
+    projected: Vec<f64>,
+}
+
+impl Linearised {
+    fn new(jacobian: &DMatrix<f64>, residual: &[f64], rank: usize) -> Result<Self, LinalgError> {
+        let residual = DMatrix::from_column_slice(residual.len(), 1, residual);
+        let (q, r) = qr_thin(jacobian);
+        let svd = svd_thin(&r)?;
+        let rank = rank.min(svd.values.len());
+        let projected = multiply_tn(&svd.u, &multiply_tn(&q, &residual));
+        Ok(Self {
+            directions: svd.v.columns(0, rank).into_owned(),
+            values: svd.values.iter().take(rank).copied().collect(),
+            projected: projected.iter().take(rank).copied().collect(),
+        })
+    }
+
+    fn largest(&self) -> f64 {
+        self.values.first().copied().unwrap_or(0.0)
+    }
+
+    /// Decrease of the cost that a full step promises.
+    pub fn decrease(&self) -> f64 {
+        let determined = DETERMINED * self.largest();
+        self.values
+            .iter()
+            .zip(&self.projected)
+            .filter(|(value, _)| **value > determined)
+            .map(|(_, p)| p * p)
+            .sum()
+    }
+
+    /// Step with Levenberg-Marquardt damping `damping` (relative to the largest singular value; zero is
+    /// Gauss-Newton).
+    pub fn step(&self, damping: f64) -> DVector<f64> {
+        let largest = self.largest();
+        let coefficients = DVector::from_iterator(
+            self.values.len(),
+            self.values.iter().zip(&self.projected).map(|(&value, &p)| {
+                if value > DETERMINED * largest {
+                    p * value / (value * value + (damping * largest).powi(2))
+                } else {
+                    0.0
+                }
+            }),
+        );
+        &self.directions * coefficients
+    }
+
+    /// Pseudo-inverse of the information.
+    pub fn covariance(&self) -> DMatrix<f64> {
+        let mut scaled = self.directions.clone();
+        for (i, &value) in self.values.iter().enumerate() {
+            let inverse = if value > DETERMINED * self.largest() {
+                1.0 / value
+            } else {
+                0.0
+            };
+            scaled.column_mut(i).scale_mut(inverse);
+        }
+        multiply_nt(&scaled, &scaled)
+    }
+}
+
+/// Derivative of the modulus of each eigenvalue of `A` that sits on the circle of `radius`, with respect to
+/// the parameters: `d|lambda| = Re(conj(lambda) / |lambda| w dA v)`. One row an eigenvalue, of a complex pair
+/// only one.
+pub fn boundary_gradient(
+    system: &StateSpace,
+    layout: &ParameterLayout,
+    radius: f64,
+) -> Result<DMatrix<f64>, LinalgError> {
+    let decomposition = eigen(&system.a)?;
+    let n = system.states();
+    let on_boundary: Vec<usize> = (0..n)
+        .filter(|&i| {
+            let value = decomposition.values[i];
+            value.im >= 0.0 && value.norm() > radius * (1.0 - 1e-9)
+        })
+        .collect();
+    Ok(DMatrix::from_fn(
+        on_boundary.len(),
+        layout.len(),
+        |row, p| {
+            if p >= n * n {
+                return 0.0;
+            }
+            let i = on_boundary[row];
+            let value = decomposition.values[i];
+            let change = decomposition.left[(i, p % n)] * decomposition.right[(p / n, i)];
+            (value.conj() / value.norm() * change).re
+        },
+    ))
+}
+
+/// The linearised problem, confined to the boundary of the stability radius where a free step would leave
+/// it (an active set: an eigenvalue that the step would take inward is let go).
+pub fn linearise(
+    jacobian: DMatrix<f64>,
+    residual: &[f64],
+    rank: usize,
+    boundary: &DMatrix<f64>,
+) -> Result<Linearised, LinalgError> {
+    let free = Linearised::new(&jacobian, residual, rank)?;
+    let outward = boundary * free.step(0.0);
+    let active: Vec<usize> = (0..boundary.nrows())
+        .filter(|&i| outward[i] > 0.0)
+        .collect();
+    if active.is_empty() {
+        return Ok(free);
+    }
+    let (normal, _) = qr_thin(&boundary.select_rows(&active).transpose());
+    let confined = &jacobian - (&jacobian * &normal) * normal.transpose();
+    Linearised::new(&confined, residual, rank - active.len())
+}

@@ -1,0 +1,228 @@
+//! The Gauss-Newton polish: the maximum-likelihood model of the given order, computed from `R` alone.
+//!
+//! The vector ARX coefficients are a sufficient statistic as long as the past window is long enough, so
+//! the prediction-error estimate is the model whose own coefficients
+//! `Xi(theta) = [C At^{p-1} [B~ K] ... C [B~ K] (D)]`, `At = A - K C`, `B~ = B - K D`, are nearest to the
+//! estimated ones in their own metric:
+//!
+//! `min_theta | Lambda^{-1/2} (Ry' - Xi(theta) Rz') |_F^2`.
+//!
+//! At the minimum the cost is chi-square with `l m - n (r + 2 l) (- l r)` degrees of freedom when order
+//! and window are right, which makes a test of both; and the inverse of the information matrix is the
+//! Cramer-Rao bound. Indirect prediction-error method of Soderstrom, Stoica & Friedlander (1991) applied
+//! to the first step of PBSID.
+
+mod linearised;
+mod predictor;
+
+use nalgebra::DMatrix;
+
+use self::linearised::{boundary_gradient, linearise};
+use self::predictor::Problem;
+pub use self::predictor::predictor_coefficients;
+use super::stable::with_poles_inside;
+use super::varx::Varx;
+use crate::covariance::{ParameterCovariance, ParameterLayout};
+use crate::linalg::{
+    LinalgError, cholesky_upper, multiply_nt, solve_upper_transposed, spectral_radius,
+    stabilising_observer_gain,
+};
+use crate::model::StateSpace;
+
+/// The iteration ends when a step promises less than this in the cost, which is in units of chi-square:
+/// far below what a standard deviation is (1).
+const DECREASE: f64 = 1e-9;
+/// A Gauss-Newton iteration that has not ended by then will not.
+const ITERATIONS: usize = 60;
+/// Steps of which the one that decreases the cost most is taken: length of the step, and Levenberg-Marquardt
+/// damping relative to the largest singular value of the Jacobian. An order too high makes the Jacobian
+/// nearly singular, and only damping helps there.
+const TRIES: [(f64, f64); 9] = [
+    (1.0, 0.0),
+    (0.5, 0.0),
+    (0.25, 0.0),
+    (1.0, 1e-5),
+    (1.0, 1e-4),
+    (1.0, 1e-3),
+    (1.0, 1e-2),
+    (1.0, 1e-1),
+    (1.0, 1.0),
+];
+/// Steps in a row that each gain less than [`GAIN`] end the iteration: a flat valley, where the cost, and
+/// with it every prediction, no longer changes.
+const FLAT_STEPS: usize = 3;
+/// See [`FLAT_STEPS`]; in units of chi-square.
+const GAIN: f64 = 1e-5;
+/// Radius of `A - K C` beyond which the predictor is replaced by its stabilised mirror image before the
+/// first step: powers of it up to the past window would overflow the regression.
+const LARGEST_PREDICTOR_RADIUS: f64 = 0.9999;
+
+/// Result of the polish, in scaled units.
+#[derive(Debug, Clone)]
+pub struct Polished {
+    /// The system at the minimum.
+    pub system: StateSpace,
+    /// Inverse information, `(X' X)^+`, in the basis of the system.
+    pub covariance: ParameterCovariance,
+    /// Cost at the start and at the minimum (chi-square units).
+    pub start_cost: f64,
+    /// Cost at the minimum.
+    pub cost: f64,
+    /// Degrees of freedom of the cost.
+    pub degrees_of_freedom: usize,
+    /// Number of Gauss-Newton steps.
+    pub iterations: usize,
+    /// Whether the iteration ended by its criterion.
+    pub converged: bool,
+}
+
+/// Polishes `start` against the vector ARX estimate. When `largest_radius` is given, the spectral radius of
+/// `A` stays within it.
+///
+/// # Errors
+/// [`LinalgError`] when the innovation covariance is singular (a noise-free record needs no polish) or
+/// the iteration meets numbers that are not finite at its start.
+pub fn polish(
+    start: &StateSpace,
+    varx: &Varx,
+    largest_radius: Option<f64>,
+) -> Result<Polished, LinalgError> {
+    let layout = ParameterLayout {
+        states: start.states(),
+        inputs: start.inputs(),
+        outputs: start.outputs(),
+        feedthrough: varx.feedthrough,
+    };
+    let problem = Problem::new(varx, layout)?;
+    let mut system = start.clone();
+    if spectral_radius(&(&system.a - &system.k * &system.c))? > LARGEST_PREDICTOR_RADIUS {
+        let (gain, _) = stabilising_observer_gain(
+            &system.a,
+            &system.c,
+            &system.k,
+            &varx.innovation_covariance,
+        )?;
+        system.k = gain;
+    }
+    let rank = layout.identifiable();
+    let start_cost = problem.cost(&system);
+    if !start_cost.is_finite() {
+        return Err(LinalgError::NotFinite {
+            what: "predictor coefficients",
+        });
+    }
+    let mut cost = start_cost;
+    let mut iterations = 0;
+    let mut flat = 0;
+    let mut converged = false;
+    let covariance = loop {
+        let jacobian = problem.jacobian(&system);
+        if jacobian.iter().any(|v| !v.is_finite()) {
+            return Err(LinalgError::NotFinite {
+                what: "Gauss-Newton step",
+            });
+        }
+        let residual = problem.residual(&system);
+        let boundary = match largest_radius {
+            Some(radius) => boundary_gradient(&system, &layout, radius)?,
+            None => DMatrix::zeros(0, layout.len()),
+        };
+        let linearised = linearise(jacobian, residual.as_slice(), rank, &boundary)?;
+        if linearised.decrease() < DECREASE || flat == FLAT_STEPS {
+            converged = true;
+            break linearised.covariance();
+        }
+        if iterations == ITERATIONS {
+            break linearised.covariance();
+        }
+        iterations += 1;
+        let theta = layout.pack(&system);
+        // A cost is cheap beside a Jacobian: try all, take the best.
+        let better = TRIES
+            .iter()
+            .filter_map(|&(length, damping)| {
+                let moved: Vec<f64> = theta
+                    .iter()
+                    .zip(linearised.step(damping).iter())
+                    .map(|(value, change)| value + length * change)
+                    .collect();
+                let candidate = layout.unpack(&moved, &system);
+                let candidate = match largest_radius {
+                    Some(radius) => with_poles_inside(&candidate, radius).ok()?,
+                    None => candidate,
+                };
+                let candidate_cost = problem.cost(&candidate);
+                (candidate_cost < cost).then_some((candidate, candidate_cost))
+            })
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        match better {
+            Some((candidate, candidate_cost)) => {
+                flat = if cost - candidate_cost < GAIN {
+                    flat + 1
+                } else {
+                    0
+                };
+                system = candidate;
+                cost = candidate_cost;
+            }
+            None => {
+                // At the minimum to rounding.
+                converged = linearised.decrease() < GAIN * (1.0 + cost);
+                break linearised.covariance();
+            }
+        }
+    };
+    Ok(Polished {
+        system,
+        covariance: ParameterCovariance {
+            layout,
+            matrix: covariance,
+            degrees_of_freedom: None,
+        },
+        start_cost,
+        cost,
+        degrees_of_freedom: (layout.outputs * varx.regressors()).saturating_sub(rank),
+        iterations,
+        converged,
+    })
+}
+
+/// Cost of a system against the vector ARX estimate (chi-square units), infinite when its predictor
+/// overflows.
+///
+/// # Errors
+/// [`LinalgError`] when the innovation covariance is singular.
+pub fn coefficient_cost(system: &StateSpace, varx: &Varx) -> Result<f64, LinalgError> {
+    let upper = cholesky_upper(&varx.innovation_covariance)?;
+    let coefficients = predictor_coefficients(system, varx.past, varx.feedthrough);
+    let difference = &varx.output_factor - multiply_nt(&varx.regressor_factor, &coefficients);
+    let cost = solve_upper_transposed(&upper, &difference.transpose()).norm_squared();
+    Ok(if cost.is_finite() {
+        cost
+    } else {
+        f64::INFINITY
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::predictor::tests::{system, varx_of};
+    use super::*;
+
+    #[test]
+    fn polish_finds_the_system_from_a_perturbed_start() {
+        for feedthrough in [false, true] {
+            let truth = system(feedthrough);
+            let varx = varx_of(&truth, 6, feedthrough);
+            let mut start = truth.clone();
+            start.a[(0, 1)] += 0.05;
+            start.b[(1, 0)] -= 0.1;
+            start.k[(0, 0)] += 0.1;
+            let result = polish(&start, &varx, None).unwrap();
+            assert!(result.converged && result.cost < 1e-10 * result.start_cost);
+            let found = predictor_coefficients(&result.system, 6, feedthrough);
+            assert!((found - &varx.coefficients).amax() < 1e-8);
+            assert!(result.iterations <= 12, "{}", result.iterations);
+        }
+    }
+}
