@@ -29,8 +29,8 @@ fn read_csv(bencher: Bencher, samples: usize) {
         .expect("a recording on disk");
     let source = Source::Path(path);
     bencher.bench(|| {
-        let mut reader = LogReader::open(&source, &Roles::default(), RoleNeed::Identify)
-            .expect("the recording");
+        let mut reader =
+            LogReader::open(&source, &Roles::default(), RoleNeed::Identify).expect("the recording");
         let mut block = innovant::log::Block::new();
         while reader.next_block(&mut block).expect("a block") {
             black_box(&block);

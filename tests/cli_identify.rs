@@ -239,6 +239,17 @@ fn feedthrough_delay_robust_and_stable() {
 }
 
 #[test]
+fn feedthrough_in_closed_loop_is_warned_of() {
+    let folder = Folder::new();
+    folder.recording("log.csv", &systems::van_wingerden_one(), 1500, 1);
+    let table = folder.run(&["identify", "log.csv", "--feedthrough"]).ok();
+    assert!(
+        table.contains("warning: the recording was taken in closed loop"),
+        "{table}"
+    );
+}
+
+#[test]
 fn an_output_of_the_future_is_refused_before_the_work() {
     let folder = Folder::new();
     let path = folder.recording("log.csv", &systems::servo(), 500, 1);

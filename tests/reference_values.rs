@@ -15,7 +15,10 @@ fn close(found: f64, expected: f64, what: &str) {
 /// Reference values are printed with five digits where no more are given.
 fn close_to_digits(found: f64, expected: f64, digits: i32, what: &str) {
     let error = (found / expected - 1.0).abs();
-    assert!(error < 10_f64.powi(1 - digits), "{what}: {found} instead of {expected}");
+    assert!(
+        error < 10_f64.powi(1 - digits),
+        "{what}: {found} instead of {expected}"
+    );
 }
 
 fn run(arguments: &[&str]) -> Value {
@@ -37,11 +40,23 @@ fn command_line_reproduces_the_reference_values() {
     let folder = tempfile::tempdir().unwrap();
     let model_path = folder.path().join("model.json");
     let model_path = model_path.to_str().unwrap();
-    let csv = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/pbsid_reference.csv");
+    let csv = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/data/pbsid_reference.csv"
+    );
     Command::cargo_bin("innovant")
         .unwrap()
-        .args(["identify", csv, "--order", "4", "--past", "10", "--future", "10"])
-        .args(["--polish", "never", "--detrend", "none", "--output", model_path])
+        .args([
+            "identify", csv, "--order", "4", "--past", "10", "--future", "10",
+        ])
+        .args([
+            "--polish",
+            "never",
+            "--detrend",
+            "none",
+            "--output",
+            model_path,
+        ])
         .assert()
         .success();
     let model: Value = serde_json::from_slice(&std::fs::read(model_path).unwrap()).unwrap();
@@ -49,7 +64,12 @@ fn command_line_reproduces_the_reference_values() {
     let singular_values = &model["diagnostics"]["singular_values"];
     let expected = [285.74318, 253.10865, 78.97419, 65.53437, 6.97043];
     for (i, value) in expected.iter().enumerate() {
-        close_to_digits(singular_values[i].as_f64().unwrap(), *value, 6, "singular value");
+        close_to_digits(
+            singular_values[i].as_f64().unwrap(),
+            *value,
+            6,
+            "singular value",
+        );
     }
     let covariance = &model["innovation_covariance"];
     close(covariance[0][0].as_f64().unwrap(), 0.99626403, "Lambda");
@@ -66,7 +86,8 @@ fn command_line_reproduces_the_reference_values() {
             .unwrap()
             .iter()
             .find(|p| {
-                (p["real"].as_f64().unwrap() - real).abs() < 0.1 && p["imag"].as_f64().unwrap() > 0.0
+                (p["real"].as_f64().unwrap() - real).abs() < 0.1
+                    && p["imag"].as_f64().unwrap() > 0.0
             })
             .unwrap();
         close(pole["real"].as_f64().unwrap(), real, "pole");

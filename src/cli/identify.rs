@@ -250,11 +250,24 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The residual tests; when they are not possible, the model says so among its warnings.
+/// The residual tests; what they say against the model as a whole becomes one of its warnings.
 fn test(records: &mut dyn Records, model: &mut Model) -> anyhow::Result<Option<Validation>> {
     let deviations = Deviations::of_records(records, model)?;
     match judge(model, &deviations, Relation::Estimation, None) {
-        Ok(tests) => Ok(Some(tests)),
+        Ok(tests) => {
+            let feedback = tests.feedback.as_ref();
+            if let Some(summary) = &mut model.summary
+                && summary.options.feedthrough
+                && feedback.is_some_and(|test| test.p_value < tests.level)
+            {
+                summary.warnings.push(
+                    "the recording was taken in closed loop: D is only right when the controller acts with a \
+                     delay; leave out --feedthrough when it does not"
+                        .to_owned(),
+                );
+            }
+            Ok(Some(tests))
+        }
         Err(reason) => {
             if let Some(summary) = &mut model.summary {
                 summary

@@ -45,8 +45,9 @@ pub enum ValidateError {
     },
     /// The one-step predictor runs away.
     #[error(
-        "the one-step prediction of the model runs away on recording {record}: A - K C is unstable \
-         (spectral radius {spectral_radius:.6}), so the model cannot be judged; identify it again"
+        "the one-step prediction of the model runs away on recording {record}: the spectral radius of A - K C is \
+         {spectral_radius:.6}, so errors of the initial state grow; a model can only be judged with a gain K \
+         that makes its predictor stable"
     )]
     PredictorDiverges {
         /// Number of the recording, from 1.

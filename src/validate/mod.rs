@@ -30,6 +30,7 @@
 //! Source: Ljung, *System Identification*, 2nd ed. (1999), chapter 16.
 
 mod check;
+mod curvature;
 mod error;
 mod fit_measure;
 mod innovation_size;
@@ -95,7 +96,10 @@ pub fn validate(
         .unwrap_or_else(|| (samples / (10 * q)).clamp(1, MOST_LAGS));
     let longest = own_past::longest(samples, q);
     let past = lags.max(longest);
-    let needed_columns = SAMPLES_PER_REGRESSOR * (q * lags).max(r * lags + l * longest);
+    let needed_columns = q
+        .saturating_mul(lags)
+        .max(r.saturating_mul(lags).saturating_add(l * longest))
+        .saturating_mul(SAMPLES_PER_REGRESSOR);
     // Before anything is allocated that grows with the lags asked for.
     if samples < past.saturating_add(needed_columns) {
         return Err(ValidateError::TooShort {
@@ -128,9 +132,8 @@ pub fn validate(
     };
     let sensitivity = match covariance {
         Some(covariance) => {
-            let whole = relation == Relation::Estimation && covariance.degrees_of_freedom.is_some();
             let starts = &residuals.starts;
-            Sensitivity::new(system, covariance, records, starts, past, whole)?
+            Sensitivity::new(system, covariance, records, starts, past, relation)?
         }
         None => None,
     };
@@ -302,7 +305,7 @@ impl Tests<'_> {
         }
         let covariance = match sensitivity {
             Some(sensitivity) => {
-                let averages = sensitivity.averages(&partial, given, tested);
+                let averages = sensitivity.averages(&partial, given, tested, target);
                 ScoreCovariance::new(&partial, sensitivity, &averages, relation)?
             }
             None => ScoreCovariance::exact(partial.dimension()),

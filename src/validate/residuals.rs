@@ -20,6 +20,9 @@ const FORGOTTEN: f64 = 0.01;
 const LARGEST_START_UP: usize = 10;
 /// A pole this far outside the unit circle makes a free run meaningless.
 const UNSTABLE: f64 = 1.0 + 1e-9;
+/// Factor by which a predictor may amplify the error of its initial state over a record: rounding errors
+/// then stay below the residuals.
+const RUN_AWAY: f64 = 1e6;
 /// Residuals below this share of the output are rounding errors.
 pub(super) const ROUNDING: f64 = 1e-10;
 
@@ -94,6 +97,7 @@ pub(super) fn residuals(
     let (r, l) = (system.inputs(), system.outputs());
     let bare = system.k.iter().all(|v| *v == 0.0);
     let pole = spectral_radius(&system.a)?;
+    let predictor_radius = spectral_radius(&system.predictor_matrix())?;
     let mut free_run = if pole > UNSTABLE {
         Err(format!(
             "the model is unstable (pole of modulus {pole:.4}): a free run grows without bound"
@@ -120,6 +124,12 @@ pub(super) fn residuals(
             source,
         };
         let samples = record.samples();
+        if samples as f64 * predictor_radius.ln() > RUN_AWAY.ln() {
+            return Err(ValidateError::PredictorDiverges {
+                record: index + 1,
+                spectral_radius: predictor_radius,
+            });
+        }
         let head = samples.min(SAMPLES_FOR_INITIAL_STATE);
         let (u, y) = (cut(record.inputs, 0, head), cut(record.outputs, 0, head));
         let state =
@@ -174,7 +184,7 @@ pub(super) fn residuals(
         if !out.one_step.is_finite() {
             return Err(ValidateError::PredictorDiverges {
                 record: index + 1,
-                spectral_radius: spectral_radius(&system.predictor_matrix())?,
+                spectral_radius: predictor_radius,
             });
         }
         if let Ok(sums) = &mut free_run {

@@ -10,8 +10,9 @@
 
 use nalgebra::DMatrix;
 
+use super::curvature::Curvature;
 use super::error::ValidateError;
-use super::options::RecordView;
+use super::options::{RecordView, Relation};
 use super::partial::Partial;
 use super::residuals::Start;
 use crate::covariance::ParameterCovariance;
@@ -49,6 +50,8 @@ pub(super) struct Sensitivity {
     covariance: DMatrix<f64>,
     /// Number of parameters that the data determine.
     rank: usize,
+    /// Models drawn from the covariance; only along its range.
+    curvature: Option<Curvature>,
     /// Mean of `psi Cov(theta) psi'` for each output: residual variance that parameter errors add.
     pub(super) excess: Vec<f64>,
 }
@@ -72,6 +75,8 @@ pub(super) struct Averages {
     pub(super) error: f64,
     /// `E[psi' Lambda^-1 psi]`, `m x m`.
     pub(super) information: DMatrix<f64>,
+    /// Mean square of what the first order misses in one whitened score.
+    pub(super) remainder: f64,
     /// Samples averaged over.
     pub(super) samples: usize,
 }
@@ -79,16 +84,18 @@ pub(super) struct Averages {
 impl Sensitivity {
     /// Runs the sensitivity filters over the beginning of the records.
     ///
-    /// With `whole_space`, along all parameters instead of only those in the range of the covariance: a
-    /// jackknife covariance may have a smaller rank than the model has parameters.
+    /// On the estimation record a jackknife covariance may have a smaller rank than the model has parameters:
+    /// then along all parameters instead of only those in the range of the covariance.
     pub(super) fn new(
         system: &StateSpace,
         covariance: &ParameterCovariance,
         records: &[RecordView<'_>],
         starts: &[Start],
         past: usize,
-        whole_space: bool,
+        relation: Relation,
     ) -> Result<Option<Self>, ValidateError> {
+        let fresh = relation == Relation::Fresh;
+        let whole_space = !fresh && covariance.degrees_of_freedom.is_some();
         let (basis, inner, rank) = directions(covariance, whole_space)?;
         let m = basis.ncols();
         if m == 0 {
@@ -102,6 +109,7 @@ impl Sensitivity {
         let mut segments = Vec::new();
         let mut excess = vec![0.0; l];
         let mut used = 0.0;
+        let mut followed = Vec::with_capacity(records.len());
         for (record, start) in records.iter().zip(starts) {
             let kept = record.samples() - start.dropped;
             let share = if total > limit {
@@ -109,6 +117,7 @@ impl Sensitivity {
             } else {
                 kept
             };
+            followed.push(if share > past { share } else { 0 });
             if share <= past {
                 continue;
             }
@@ -137,7 +146,16 @@ impl Sensitivity {
             }
             .into());
         }
+        let curvature = if fresh {
+            let layout = covariance.layout;
+            Some(Curvature::new(
+                system, layout, &basis, records, starts, &followed, past,
+            )?)
+        } else {
+            None
+        };
         Ok(Some(Self {
+            curvature,
             segments,
             directions: m,
             inputs: r,
@@ -154,7 +172,7 @@ impl Sensitivity {
         self.rank
     }
 
-    /// `F` with `F F' =` the covariance of the coordinates.
+    /// Covariance of the coordinates along the directions.
     pub(super) fn covariance(&self) -> &DMatrix<f64> {
         &self.covariance
     }
@@ -165,6 +183,7 @@ impl Sensitivity {
         partial: &Partial,
         conditions: &[Regressor],
         tested: &[Regressor],
+        target: &[Regressor],
     ) -> Averages {
         let (m, l) = (self.directions, self.outputs);
         let q = self.inputs + l;
@@ -245,12 +264,18 @@ impl Sensitivity {
         } else {
             0.0
         };
-        Averages {
+        let mut averages = Averages {
             cross,
             error,
             information: information * (n / used as f64),
+            remainder: 0.0,
             samples: used,
+        };
+        if let Some(curvature) = &self.curvature {
+            averages.remainder =
+                curvature.remainder(partial, &averages, conditions, tested, target);
         }
+        averages
     }
 }
 

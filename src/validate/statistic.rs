@@ -63,10 +63,6 @@ impl ScoreCovariance {
         relation: Relation,
     ) -> Result<Self, ValidateError> {
         let n = partial.samples as f64;
-        let loss = averages
-            .information
-            .component_mul(sensitivity.covariance())
-            .sum();
         match relation {
             Relation::Fresh => {
                 let factor = crate::linalg::symmetric_square_root_factor(sensitivity.covariance())?;
@@ -74,17 +70,15 @@ impl ScoreCovariance {
                 let svd = svd_thin(&q)?;
                 // The averages are over part of the record only: the part of Q that they miss.
                 let missed = n * averages.error * (1.0 - averages.samples as f64 / n).max(0.0);
-                // Second order: parameter errors take `h` of the residual variance, which shows as
-                // correlations of that size. They reach the accuracy of the scores when N h^2 = 1.
-                let h = loss / partial.target.nrows().max(1) as f64;
-                let second_order = (n * h * h - 1.0).max(0.0);
                 Ok(Self {
                     change: svd.values.map(|s| s * s),
                     directions: svd.u,
-                    inflation: 1.0 + missed + second_order,
+                    inflation: 1.0 + missed + averages.remainder,
                 })
             }
             Relation::Estimation => {
+                let information = &averages.information;
+                let loss = information.component_mul(sensitivity.covariance()).sum();
                 let rho = (n * loss / sensitivity.rank().max(1) as f64).min(1.0);
                 let eigen = symmetric_eigen(&averages.information)?;
                 let largest = eigen.values.amax();

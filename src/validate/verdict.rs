@@ -25,6 +25,9 @@ pub(super) fn holm(p_values: &[Option<f64>], level: f64) -> Vec<bool> {
     rejected
 }
 
+/// Share of the level at which what is only information gets a sentence.
+const INFORMATION: f64 = 0.1;
+
 /// Decides, and fills in `rejected` and `findings`. `noise_model`: whether the model claims one.
 pub(super) fn decide(validation: &mut Validation, noise_model: bool) {
     let p = |test: &Option<ResidualTest>| test.as_ref().map(|t| t.p_value);
@@ -89,7 +92,7 @@ pub(super) fn decide(validation: &mut Validation, noise_model: bool) {
         );
     }
     if let Some(test) = &validation.feedback
-        && test.p_value < level
+        && test.p_value < INFORMATION * level
     {
         findings.push(
             "past residuals act on the inputs: the recording was taken in closed loop, and only past inputs \
@@ -98,7 +101,7 @@ pub(super) fn decide(validation: &mut Validation, noise_model: bool) {
         );
     }
     if let Some(test) = &validation.same_sample
-        && test.p_value < level
+        && test.p_value < INFORMATION * level
         && let Some(strongest) = &test.strongest
     {
         findings.push(format!(

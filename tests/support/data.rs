@@ -42,8 +42,14 @@ fn two_by_two() -> String {
         }
         held[channel]
     });
-    log.inputs = vec![Channel::parse("u_heater [kW]"), Channel::parse("u_pump [V]")];
-    log.outputs = vec![Channel::parse("y_temperature [K]"), Channel::parse("y_level [cm]")];
+    log.inputs = vec![
+        Channel::parse("u_heater [kW]"),
+        Channel::parse("u_pump [V]"),
+    ];
+    log.outputs = vec![
+        Channel::parse("y_temperature [K]"),
+        Channel::parse("y_level [cm]"),
+    ];
     table(&log, &[20.0, 5.0, 350.0, 42.0], 5)
 }
 
@@ -58,7 +64,11 @@ fn table(log: &Log, levels: &[f64], digits: usize) -> String {
     for k in 0..log.samples() {
         // Milliseconds as integers, so that the time stamps are exact decimals.
         let milliseconds = (k as f64 * log.sample_time * 1e3).round() as u64;
-        out.push_str(&format!("{}.{:03}", milliseconds / 1000, milliseconds % 1000));
+        out.push_str(&format!(
+            "{}.{:03}",
+            milliseconds / 1000,
+            milliseconds % 1000
+        ));
         for (column, level) in log.input_data.iter().chain(&log.output_data).zip(levels) {
             out.push_str(&format!(",{:.digits$}", column[k] + level));
         }

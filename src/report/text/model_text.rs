@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::number::{percent, significant};
 use super::orders::order_evidence;
-use super::roots::{roots, shortened, static_gains};
+use super::roots::{poles, shortened, static_gains};
 use super::table::Table;
 use super::validation_text::findings;
 use super::verdict::verdict;
@@ -13,6 +13,9 @@ use crate::covariance::{Invariants, invariants};
 use crate::identify::{CovarianceKind, Model, Summary};
 use crate::report::names;
 use crate::validate::Validation;
+
+/// Poles and gains that a summary lists.
+const LINES_SHOWN: usize = 12;
 
 /// What the summary of a model shows.
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +43,7 @@ pub fn model_text(text: &ModelText<'_>) -> String {
         out.push_str(&fit(tests));
     }
     if let Some(described) = described(model) {
-        out.push_str(&dynamics(model, &described, style));
+        out.push_str(&dynamics(model, &described, LINES_SHOWN, style));
     }
     if let Some(summary) = &model.summary {
         out.push_str(&if orders.len() > 1 {
@@ -76,7 +79,7 @@ pub(super) fn described(model: &Model) -> Option<Invariants> {
 }
 
 /// Poles and gains.
-pub(super) fn dynamics(model: &Model, described: &Invariants, style: Style) -> String {
+pub(super) fn dynamics(model: &Model, described: &Invariants, most: usize, style: Style) -> String {
     let spread = match (&model.covariance, style.plus_minus) {
         (Some(_), pm) => format!(" ({pm} one standard deviation)"),
         (None, _) => String::new(),
@@ -84,10 +87,11 @@ pub(super) fn dynamics(model: &Model, described: &Invariants, style: Style) -> S
     let channels = |of: &[crate::identify::IdentifiedChannel]| {
         of.iter().map(|c| c.channel.clone()).collect::<Vec<_>>()
     };
-    let mut out = roots(&format!("Poles{spread}"), &described.poles, style);
+    let mut out = poles(&format!("Poles{spread}"), &described.poles, most, style);
     out.push_str(&static_gains(
         &format!("Static gain{spread}"),
         &described.static_gain,
+        most,
         &channels(&model.inputs),
         &channels(&model.outputs),
         style,

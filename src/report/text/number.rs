@@ -47,6 +47,10 @@ pub(crate) fn with_std(value: Option<f64>, std: Option<f64>, style: Style) -> St
 
 /// A percentage.
 pub(crate) fn percent(value: f64) -> String {
+    if value < -1000.0 {
+        // Worse than useless; how much does not matter.
+        return "< -1000 %".to_owned();
+    }
     // A fit of 99.99 % and one of 100 % are not the same thing.
     if value > 99.0 && value < 100.0 {
         format!("{value:.2} %")
@@ -120,6 +124,7 @@ mod tests {
         assert_eq!(significant(0.0, 5), "0");
         assert_eq!(percent(99.987), "99.99 %");
         assert_eq!(percent(62.34), "62.3 %");
+        assert_eq!(percent(-1e11), "< -1000 %");
         assert_eq!(probability(0.25), "0.250");
         assert_eq!(probability(3e-5), "3e-5");
         assert_eq!(probability(0.0), "< 1e-12");

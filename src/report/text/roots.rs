@@ -4,15 +4,12 @@ use std::f64::consts::TAU;
 
 use super::number::{significant, with_std};
 use super::table::Table;
-use super::{Style, WIDTH, count};
+use super::{Style, WIDTH};
 use crate::covariance::{Root, StaticGain};
 use crate::log::Channel;
 
-/// Gains that are listed; more are left to `innovant show`.
-const GAINS_SHOWN: usize = 12;
-
-/// Poles or zeros as natural frequency, damping and time constant; a line for each pair.
-pub(super) fn roots(title: &str, roots: &[Root], style: Style) -> String {
+/// Poles as natural frequency, damping and time constant; a line for each pair, at most so many.
+pub(super) fn poles(title: &str, roots: &[Root], most: usize, style: Style) -> String {
     if roots.is_empty() {
         return String::new();
     }
@@ -23,7 +20,8 @@ pub(super) fn roots(title: &str, roots: &[Root], style: Style) -> String {
         "damping",
         "time constant [s]",
     ]);
-    for root in roots.iter().filter(|root| root.imag >= 0.0) {
+    let lines = || roots.iter().filter(|root| root.imag >= 0.0);
+    for root in lines().take(most) {
         table.row([
             kind(root),
             with_std(root.natural_frequency_hz, root.natural_frequency_std, style),
@@ -40,7 +38,19 @@ pub(super) fn roots(title: &str, roots: &[Root], style: Style) -> String {
             with_std(root.time_constant_s, root.time_constant_std, style),
         ]);
     }
-    format!("\n{title}\n{}", table.lines())
+    format!(
+        "\n{title}\n{}{}",
+        table.lines(),
+        and_more(lines().count(), most)
+    )
+}
+
+/// Says that a list was cut.
+fn and_more(count: usize, most: usize) -> String {
+    match count.saturating_sub(most) {
+        0 => String::new(),
+        more => format!("  and {more} more, which `innovant show` lists\n"),
+    }
 }
 
 /// What a pole is, in a word.
@@ -84,10 +94,11 @@ pub(super) fn zeros(title: &str, zeros: &[Root], style: Style) -> String {
     format!("\n{title}\n{}", table.lines())
 }
 
-/// Static gains, a line for each path.
+/// Static gains, a line for each path, at most so many.
 pub(super) fn static_gains(
     title: &str,
     gains: &[StaticGain],
+    most: usize,
     inputs: &[Channel],
     outputs: &[Channel],
     style: Style,
@@ -101,7 +112,7 @@ pub(super) fn static_gains(
             .find(|c| c.name == name)
             .and_then(|c| c.unit.clone())
     };
-    for gain in gains.iter().take(GAINS_SHOWN) {
+    for gain in gains.iter().take(most) {
         let units = match (unit(outputs, &gain.output), unit(inputs, &gain.input)) {
             (None, None) => String::new(),
             (Some(output), None) => format!("{output} per unit"),
@@ -123,14 +134,11 @@ pub(super) fn static_gains(
     if table.is_empty() {
         return String::new();
     }
-    let more = match gains.len().saturating_sub(GAINS_SHOWN) {
-        0 => String::new(),
-        more => format!(
-            "  and {}: `innovant show --format json` has all\n",
-            count(more, "more path")
-        ),
-    };
-    format!("\n{title}\n{}{more}", table.lines())
+    format!(
+        "\n{title}\n{}{}",
+        table.lines(),
+        and_more(gains.len(), most)
+    )
 }
 
 /// A name that leaves room for the numbers.

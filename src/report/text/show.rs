@@ -23,7 +23,7 @@ pub fn show_text(
 ) -> String {
     let mut out = wrapped("", &verdict(model, tests));
     out.push_str(&channels(model));
-    out.push_str(&dynamics(model, described, style));
+    out.push_str(&dynamics(model, described, usize::MAX, style));
     out.push_str(&zeros("Zeros (z plane)", &described.zeros, style));
     if let Some(armax) = &described.armax {
         out.push_str("\nPolynomials, a(q) y = b(q) u + c(q) e, from lag 0\n");
@@ -124,27 +124,22 @@ fn responses(points: &[ResponsePoint], every_frequency: bool) -> String {
         // Counted from the end, so that the Nyquist frequency is among them.
         let shown: Vec<&&ResponsePoint> = along.iter().rev().step_by(step).collect();
         for point in shown.into_iter().rev() {
-            let band = |band: Option<[f64; 2]>, scale: f64| {
+            let magnitude = |value: f64| significant(value, 4);
+            // Rounded first, and zero added, so that a rounding error does not print as -0.0.
+            let degrees =
+                |value: f64| format!("{:.1}", (value.to_degrees() * 10.0).round() / 10.0 + 0.0);
+            let band = |band: Option<[f64; 2]>, text: &dyn Fn(f64) -> String| {
                 band.map_or("-".to_owned(), |[low, high]| {
-                    format!(
-                        "{} .. {}",
-                        significant(low * scale, 4),
-                        significant(high * scale, 4)
-                    )
+                    format!("{} .. {}", text(low), text(high))
                 })
             };
-            let degrees = 1.0_f64.to_degrees();
             table.row([
                 significant(point.rad_s, 4),
                 significant(point.hz, 4),
-                point
-                    .magnitude
-                    .map_or("-".to_owned(), |m| significant(m, 5)),
-                band(point.magnitude_95, 1.0),
-                point
-                    .phase_rad
-                    .map_or("-".to_owned(), |p| significant(p * degrees, 4)),
-                band(point.phase_95, degrees),
+                point.magnitude.map_or("-".to_owned(), magnitude),
+                band(point.magnitude_95, &magnitude),
+                point.phase_rad.map_or("-".to_owned(), degrees),
+                band(point.phase_95, &degrees),
             ]);
         }
         out.push_str(&wrapped(

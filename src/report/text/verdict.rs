@@ -37,7 +37,10 @@ fn judgement(summary: &Summary, tests: Option<&Validation>) -> String {
         .is_some_and(|p| p < ORDER_TEST_LEVEL);
     let vanished = tests.is_some_and(|t| t.whiteness.is_none() && t.past_inputs.is_none());
     let rejected = tests.is_some_and(|t| t.rejected);
-    let main = if rejected {
+    let unstable_predictor = summary.diagnostics.predictor_radius >= 1.0;
+    let main = if unstable_predictor {
+        "not to be trusted, its one-step predictor is unstable"
+    } else if rejected {
         "rejected, the recording holds more than it explains"
     } else if order_too_low {
         "the recording holds more than it explains"
@@ -52,7 +55,9 @@ fn judgement(summary: &Summary, tests: Option<&Validation>) -> String {
         0 => main.to_owned(),
         // The verdict says already what this one warns of.
         1 if order_too_low => main.to_owned(),
-        n if rejected || order_too_low => format!("{main}; see {}", count(n, "warning")),
+        n if rejected || order_too_low || unstable_predictor => {
+            format!("{main}; see {}", count(n, "warning"))
+        }
         n => format!("{main}, but see {}", count(n, "warning")),
     }
 }

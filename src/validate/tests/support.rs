@@ -1,14 +1,17 @@
 //! Models and records for the tests of the whole judgement.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, dmatrix};
 use rayon::prelude::*;
 
 use crate::covariance::ParameterCovariance;
 use crate::identify::{Fit, MemoryRecords, Options, Order, fit};
 use crate::log::Log;
 use crate::model::StateSpace;
-use crate::systems::TestSystem;
-use crate::validate::{RecordView, Relation, Validation, ValidationOptions, validate};
+use crate::systems::{TestSystem, servo};
+use crate::validate::{
+    RecordView, Relation, ResidualTest, Validation, ValidationOptions, validate,
+};
+use statrs::distribution::{Binomial, DiscreteCDF};
 
 pub(super) fn identified(log: &Log, order: usize) -> Fit {
     let options = Options {
@@ -73,4 +76,46 @@ pub(super) fn bare(test: &TestSystem) -> StateSpace {
     let mut system = test.system.clone();
     system.k.fill(0.0);
     system
+}
+
+/// [`servo`] with the gain whose predictor is stable and whose outputs have the same spectrum; that of
+/// `servo` itself has a predictor pole at 1.0245.
+pub(super) fn steady_servo() -> TestSystem {
+    let mut test = servo();
+    test.system.k = dmatrix![6.21094739; 5.92040503; 5.54387457];
+    test.innovation_covariance = dmatrix![0.01049615];
+    test
+}
+
+/// How often each test rejects at `level`, held against binomial bounds that a right test leaves once in a
+/// thousand times.
+pub(super) fn assert_level(name: &str, studies: &[Validation], tests: &[&str]) {
+    for test in tests {
+        let p_values: Vec<f64> = studies.iter().map(|v| p_value(v, test)).collect();
+        for level in [0.05, 0.01] {
+            let law = Binomial::new(level, studies.len() as u64).unwrap();
+            let most = (0..).find(|&k| law.sf(k) < 1e-3).unwrap();
+            let least = (0..).find(|&k| law.cdf(k) > 1e-3).unwrap();
+            let found = p_values.iter().filter(|p| **p < level).count() as u64;
+            println!("{name}: {test} at {level}: {found} of {}", studies.len());
+            assert!(
+                (least..=most).contains(&found),
+                "{name}: {test} rejects {found} of {} times at level {level}; expected {least} to {most}",
+                studies.len()
+            );
+        }
+    }
+}
+
+fn p_value(validation: &Validation, test: &str) -> f64 {
+    let of = |test: &Option<ResidualTest>| test.as_ref().map(|t| t.p_value);
+    match test {
+        "whiteness" => of(&validation.whiteness),
+        "past inputs" => of(&validation.past_inputs),
+        "same sample" => of(&validation.same_sample),
+        "feedback" => of(&validation.feedback),
+        "size" => validation.innovation_size.as_ref().map(|s| s.p_value),
+        _ => None,
+    }
+    .unwrap()
 }
