@@ -12,7 +12,6 @@ use super::{Outcome, Verbosity};
 use crate::identify::Model;
 use crate::linalg::spectral_radius;
 use crate::log::{Channel, Log, RoleNeed, Source, write_table};
-use crate::model::estimate_initial_state;
 use crate::report::read_model;
 
 const EXAMPLE: &str = "Examples:
@@ -76,8 +75,7 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
             wanted.join(", ")
         );
     }
-    let inputs = input_deviations(&model, &log);
-    let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
+    let inputs: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
     let start = if estimate {
         Some(initial_state(&model, &log, &inputs)?)
     } else {
@@ -94,13 +92,8 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
             log.sample_time
         ));
     }
-    let mut outputs = model.system.simulate(&inputs, start.as_ref())?;
+    let outputs = model.simulate(&inputs, start.as_ref())?;
     check_finite(&model, &log, &outputs)?;
-    for (column, channel) in outputs.iter_mut().zip(&model.outputs) {
-        for value in column {
-            *value += channel.level;
-        }
-    }
     let columns: Vec<(&Channel, &[f64])> = model
         .outputs
         .iter()
@@ -109,20 +102,6 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         .collect();
     write_table(output.path(), log.sample_time, log.start_time, &columns)?;
     Ok(Outcome::Done)
-}
-
-/// Inputs as deviations from the operating point, delayed; before the first sample they stand still.
-fn input_deviations(model: &Model, log: &Log) -> Vec<Vec<f64>> {
-    model
-        .inputs
-        .iter()
-        .zip(&log.input_data)
-        .map(|(channel, column)| {
-            (0..column.len())
-                .map(|k| column[k.saturating_sub(channel.delay)] - channel.level)
-                .collect()
-        })
-        .collect()
 }
 
 fn initial_state(model: &Model, log: &Log, inputs: &[&[f64]]) -> anyhow::Result<DVector<f64>> {
@@ -139,19 +118,8 @@ fn initial_state(model: &Model, log: &Log, inputs: &[&[f64]]) -> anyhow::Result<
             wanted.join(", ")
         );
     }
-    let outputs: Vec<Vec<f64>> = model
-        .outputs
-        .iter()
-        .zip(&log.output_data)
-        .map(|(channel, column)| column.iter().map(|y| y - channel.level).collect())
-        .collect();
-    let outputs: Vec<&[f64]> = outputs.iter().map(Vec::as_slice).collect();
-    Ok(estimate_initial_state(
-        &model.system,
-        inputs,
-        &outputs,
-        model.innovation_covariance.as_ref(),
-    )?)
+    let outputs: Vec<&[f64]> = log.output_data.iter().map(Vec::as_slice).collect();
+    Ok(model.initial_state_of(inputs, &outputs)?)
 }
 
 fn check_finite(model: &Model, log: &Log, outputs: &[Vec<f64>]) -> anyhow::Result<()> {

@@ -5,8 +5,10 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use super::error::IdentifyError;
 use super::pbsid_opt::{Decomposition, Estimate, system_matrices};
 use super::polish::{Polished, polish};
+use super::stable::with_stable_predictor;
 use super::truncation::truncation;
 use super::varx::Varx;
+use crate::model::StateSpace;
 use crate::moments::RFactor;
 
 /// A model of one order with what was learnt about it.
@@ -52,11 +54,13 @@ impl Window<'_> {
             decomposition.state_map(order),
             self.sample_time,
         )?;
-        let measure = |system| {
+        let innovation_covariance = &self.varx.innovation_covariance;
+        let measure = |system: &StateSpace| {
+            let stable = with_stable_predictor(system, innovation_covariance);
             truncation(
-                system,
+                stable.as_ref().unwrap_or(system),
                 &estimate.state_covariance,
-                &self.varx.innovation_covariance,
+                innovation_covariance,
                 self.varx.past,
                 self.varx.columns,
             )

@@ -64,10 +64,7 @@ pub enum IdentifyError {
         correlation: f64,
     },
     /// Order beyond what the windows allow.
-    #[error(
-        "order {order} is not possible: {reason}; the largest order here is {largest} \
-         (raise --future or --past for more)"
-    )]
+    #[error("order {order} is not possible: {reason}; the largest order here is {largest}")]
     Order {
         /// Order asked for.
         order: usize,
@@ -77,12 +74,10 @@ pub enum IdentifyError {
         reason: String,
     },
     /// Windows that make no sense.
-    #[error("--past {past} --future {future} is not possible: {reason}")]
+    #[error("{asked} is not possible: {reason}")]
     Horizon {
-        /// Past window.
-        past: usize,
-        /// Future window.
-        future: usize,
+        /// The windows as asked for.
+        asked: String,
         /// What is wrong.
         reason: String,
     },

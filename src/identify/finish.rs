@@ -9,7 +9,7 @@ use super::pbsid_opt::{Estimate, Weight, decompose, system_matrices};
 use super::polish::{Polished, coefficient_cost, polish};
 use super::scaling;
 use super::select::{Selection, Windowed};
-use super::stable::{largest_stable_radius, stabilised, with_poles_inside};
+use super::stable::{largest_stable_radius, stabilised, with_poles_inside, with_stable_predictor};
 use super::summary::{
     Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
 };
@@ -94,6 +94,11 @@ pub fn finish(options: &Options, data: &Data, chosen: Chosen) -> Result<Fit, Ide
         }
     }
 
+    // The covariance is that of the estimated gain; the transfer from inputs to outputs does not depend on it.
+    let mirrored = with_stable_predictor(&system, &varx.innovation_covariance);
+    let predictor_mirrored = mirrored.is_some();
+    system = mirrored.unwrap_or(system);
+
     let mut jackknife_blocks = None;
     if options.covariance == CovarianceKind::Robust {
         let replicates = replicates(
@@ -167,6 +172,9 @@ pub fn finish(options: &Options, data: &Data, chosen: Chosen) -> Result<Fit, Ide
         warnings: Vec::new(),
     };
     summary.warnings = warnings::of_fit(&summary, &varx, noise_free, options);
+    if predictor_mirrored && !noise_free {
+        summary.warnings.push(warnings::predictor_mirrored());
+    }
     Ok(Fit {
         system: scaling::system_in_user_units(&system, &data.scale),
         covariance: scaling::covariance_in_user_units(&covariance, &data.scale),

@@ -113,9 +113,12 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
 fn check_windows(options: &Options, q: usize, outputs: usize) -> Result<(), IdentifyError> {
     let (past, future) = (options.past, options.future);
     let wrong = |reason: String| {
+        let asked: Vec<String> = [("--past", past), ("--future", future)]
+            .into_iter()
+            .filter_map(|(flag, value)| Some(format!("{flag} {}", value?)))
+            .collect();
         Err(IdentifyError::Horizon {
-            past: past.unwrap_or(0),
-            future: future.unwrap_or(0),
+            asked: asked.join(" "),
             reason,
         })
     };
@@ -161,7 +164,8 @@ fn check_windows(options: &Options, q: usize, outputs: usize) -> Result<(), Iden
             return Err(IdentifyError::Order {
                 order,
                 largest,
-                reason: "it needs a window of at least order / outputs samples".to_owned(),
+                reason: "it needs --future (or --past) of at least order / outputs samples"
+                    .to_owned(),
             });
         }
     }
@@ -203,11 +207,27 @@ fn choose_past(
         .div_ceil(outputs)
         .max(options.future.unwrap_or(1));
     let limit = limit.max(smallest).min(data.lags());
-    if smallest > limit {
-        return Err(IdentifyError::TooShort {
-            samples: data.samples,
-            past: smallest,
-            needed: smallest * (q + 1) + outputs + 1,
+    if smallest > limit || smallest * (q + 1) + outputs >= data.samples {
+        let order = options.order.largest();
+        // The past window that the recording allows, with more windows than regressors.
+        let largest = (data.samples.saturating_sub(outputs + 1) / (q + 1)).min(data.lags());
+        return Err(if order.div_ceil(outputs) >= smallest {
+            IdentifyError::Order {
+                order,
+                largest: largest * outputs,
+                reason: format!(
+                    "it needs a past window of {smallest} samples, more than {} samples of {q} channels allow",
+                    data.samples
+                ),
+            }
+        } else {
+            IdentifyError::Horizon {
+                asked: format!("--future {smallest}"),
+                reason: format!(
+                    "{} samples of {q} channels allow at most {largest}",
+                    data.samples
+                ),
+            }
         });
     }
     let criterion = horizon::akaike(&data.factor(records, limit)?, options.feedthrough);

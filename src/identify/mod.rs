@@ -1,4 +1,22 @@
-//! From recordings to a model.
+//! From recordings to a model: windows, order, estimate, polish.
+//!
+//! [`identify()`] does it all. Its steps, each in a file of its own:
+//!
+//! | file | step | source |
+//! |---|---|---|
+//! | `records`, `delay`, `data` | recordings, streamed once, aligned, as moments | |
+//! | `horizon` | past window by Akaike's criterion, future window | |
+//! | `varx` | the high-order vector ARX model | van Wingerden (22)-(23) |
+//! | `pbsid_opt` | states by a weighted singular value decomposition, system matrices by least squares | van Wingerden (24)-(34) |
+//! | `order`, `select` | which order: singular values propose, a chi-square test referees | Bauer 2001 |
+//! | `truncation` | what the past window cuts off | |
+//! | `polish` | the maximum-likelihood model of that order | Soderstrom, Stoica & Friedlander 1991 |
+//! | `stable` | a stable model, guaranteed | |
+//! | `finish`, `scaling`, `warnings` | covariance, the user's units, what to know before trusting it | |
+//! | `model`, `simulate`, `summary` | the result | |
+//!
+//! Conventions: `x[k+1] = A x[k] + B u[k] + K e[k]`, `y[k] = C x[k] + D u[k] + e[k]`; `r` inputs, `l` outputs,
+//! `n` states, `z = [u; y]`, `q = r + l`; past window `p`, future window `f <= p`, `Nc = N - p` windows.
 
 mod candidate;
 mod data;
@@ -15,6 +33,7 @@ mod polish;
 mod records;
 mod scaling;
 mod select;
+mod simulate;
 mod stable;
 mod summary;
 mod truncation;

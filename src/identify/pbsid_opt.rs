@@ -187,12 +187,24 @@ pub fn system_matrices(
     next.view_mut((0, q), (n, width)).copy_from(&state);
 
     let next_state = multiply_nt(&factor.r, &next);
-    let state_inverse = left_inverse(&multiply_nt(&factor.r, &phi), n + inputs, "[xhat; u]")?;
+    let state_inverse = left_inverse(
+        &multiply_nt(&factor.r, &phi),
+        n + inputs,
+        "states and inputs",
+    )?;
     let abk = multiply(&state_inverse, &next_state).transpose();
 
     let rows = if varx.feedthrough { n + inputs } else { n };
     let of_output = multiply_nt(&factor.r, &phi.rows(0, rows).into_owned());
-    let output_inverse = left_inverse(&of_output, rows, "xhat")?;
+    let output_inverse = left_inverse(
+        &of_output,
+        rows,
+        if varx.feedthrough {
+            "states and inputs"
+        } else {
+            "states"
+        },
+    )?;
     let output_columns = factor.r.columns(total - outputs, outputs).into_owned();
     let cd = multiply(&output_inverse, &output_columns).transpose();
 

@@ -206,10 +206,6 @@ fn note(evidence: &mut Vec<OrderEvidence>, candidate: &Candidate, varx: &Varx) {
     entry.schwarz = Some(polished.cost + parameters * (varx.columns as f64).ln());
 }
 
-fn schwarz(evidence: &[OrderEvidence], order: usize) -> Option<f64> {
-    evidence.iter().find(|e| e.order == order)?.schwarz
-}
-
 fn best_by_schwarz(
     evidence: &[OrderEvidence],
     among: impl Fn(&OrderEvidence) -> bool,
@@ -222,8 +218,9 @@ fn best_by_schwarz(
         .map(|(order, _)| order)
 }
 
-/// The singular value criterion proposes; the chi-square test moves the order up while it rejects, and
-/// down while it does not.
+/// The singular value criterion proposes; the chi-square test moves the order up while it rejects, and down
+/// while it does not. An order whose model cannot be polished is too high for the record: only orders below
+/// it are looked at then.
 fn choose_order(
     evidence: &mut Vec<OrderEvidence>,
     varx: &Varx,
@@ -231,41 +228,61 @@ fn choose_order(
 ) -> (usize, String) {
     let proposal = order::proposal(evidence).unwrap_or(1);
     let largest = evidence.len().max(1);
-    let mut tested = |evidence: &mut Vec<OrderEvidence>, n: usize| -> Option<f64> {
-        note(evidence, &estimate(n)?, varx);
-        evidence.iter().find(|e| e.order == n)?.p_value
-    };
-    // Without a test (the polish did not converge, as happens when the order is too high) nothing speaks
-    // against going down.
-    let accepts = |p: Option<f64>| p.is_some_and(|p| p >= order::REFEREE_LEVEL);
-    let first = tested(evidence, proposal);
-    if first.is_none() || accepts(first) {
-        let mut order = proposal;
-        while order > 1 {
-            let fewer = tested(evidence, order - 1);
-            // The test of the whole model may accept what a comparison with one state more would not.
-            let better = match (schwarz(evidence, order - 1), schwarz(evidence, order)) {
-                (Some(fewer), Some(more)) => fewer <= more,
-                _ => true,
-            };
-            if !accepts(fewer) || !better {
-                break;
-            }
-            order -= 1;
+    let mut test = |evidence: &mut Vec<OrderEvidence>, n: usize| {
+        if let Some(candidate) = estimate(n) {
+            note(evidence, &candidate, varx);
         }
+    };
+    let find = |evidence: &[OrderEvidence], n: usize| -> Option<OrderEvidence> {
+        let entry = evidence.iter().find(|e| e.order == n)?;
+        entry.schwarz.is_some().then(|| entry.clone())
+    };
+    // Without degrees of freedom (order and window match exactly) there is nothing to reject.
+    let accepts = |e: &OrderEvidence| e.p_value.is_none_or(|p| p >= order::REFEREE_LEVEL);
+
+    let mut start = proposal;
+    test(evidence, start);
+    while start > 1 && find(evidence, start).is_none() {
+        start -= 1;
+        test(evidence, start);
+    }
+    let Some(mut best) = find(evidence, start) else {
+        return (
+            proposal,
+            format!("order {proposal}: smallest singular value criterion"),
+        );
+    };
+    if accepts(&best) {
+        while best.order > 1 {
+            test(evidence, best.order - 1);
+            // The test of the whole model may accept what a comparison with one state more would not.
+            match find(evidence, best.order - 1) {
+                Some(fewer) if accepts(&fewer) && fewer.schwarz <= best.schwarz => best = fewer,
+                _ => break,
+            }
+        }
+        let order = best.order;
         let reason = if order < proposal {
-            "the smallest that the chi-square test accepts and the Schwarz criterion does not regret"
-        } else if first.is_none() {
-            "smallest singular value criterion"
+            format!(
+                "the singular value criterion proposes {proposal}, but the chi-square test accepts {order}, and the \
+                 Schwarz criterion does not regret the rest"
+            )
         } else if order == 1 {
-            "smallest singular value criterion, and the chi-square test accepts it"
+            "smallest singular value criterion, and the chi-square test accepts it".to_owned()
         } else {
             "smallest singular value criterion; the chi-square test accepts it, and one state less is worse"
+                .to_owned()
         };
         return (order, format!("order {order}: {reason}"));
     }
-    for order in proposal + 1..=(proposal + order::ORDERS_ABOVE).min(largest) {
-        if accepts(tested(evidence, order)) {
+    let last = if start < proposal {
+        start
+    } else {
+        (proposal + order::ORDERS_ABOVE).min(largest)
+    };
+    for order in start + 1..=last {
+        test(evidence, order);
+        if find(evidence, order).is_some_and(|e| accepts(&e)) {
             return (
                 order,
                 format!(
@@ -275,13 +292,12 @@ fn choose_order(
             );
         }
     }
-    let order = best_by_schwarz(evidence, |_| true).unwrap_or(proposal);
+    let order = best_by_schwarz(evidence, |_| true).unwrap_or(start);
     (
         order,
         format!(
-            "order {order}: smallest Schwarz criterion of {proposal}..{}; the chi-square test accepts none \
-             of them, so the plant is not linear of a low order, or the past window is too short for it",
-            (proposal + order::ORDERS_ABOVE).min(largest)
+            "order {order}: smallest Schwarz criterion of those that could be computed; the chi-square test accepts \
+             none of them, so the plant is not linear of a low order, or the past window is too short for it"
         ),
     )
 }

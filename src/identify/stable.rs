@@ -5,7 +5,7 @@ use num_complex::Complex64;
 
 use super::polish::{Polished, polish};
 use super::varx::Varx;
-use crate::linalg::{LinalgError, eigen};
+use crate::linalg::{LinalgError, eigen, spectral_radius, stabilising_observer_gain};
 use crate::model::StateSpace;
 
 /// Largest spectral radius that counts as stable for a record of `columns` windows: a time constant as
@@ -56,4 +56,26 @@ pub fn stabilised(start: &StateSpace, varx: &Varx) -> Result<Polished, LinalgErr
     let radius = largest_stable_radius(varx.columns);
     let inside = with_poles_inside(start, radius)?;
     polish(&inside, varx, Some(radius))
+}
+
+/// Radius of `A - K C` beyond which a predictor counts as unstable.
+const LARGEST_PREDICTOR_RADIUS: f64 = 0.9999;
+
+/// The system with a stable predictor: when `A - K C` has eigenvalues outside the unit circle, which noise in
+/// `K` can cause, `K` is replaced by the gain of the same noise spectrum whose predictor is stable. `None` when
+/// the predictor is stable as it is, or the gain cannot be computed.
+pub fn with_stable_predictor(
+    system: &StateSpace,
+    innovation_covariance: &DMatrix<f64>,
+) -> Option<StateSpace> {
+    let predictor = &system.a - &system.k * &system.c;
+    if spectral_radius(&predictor).ok()? <= LARGEST_PREDICTOR_RADIUS {
+        return None;
+    }
+    let (k, _) =
+        stabilising_observer_gain(&system.a, &system.c, &system.k, innovation_covariance).ok()?;
+    Some(StateSpace {
+        k,
+        ..system.clone()
+    })
 }

@@ -96,3 +96,10 @@ pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Option
     }
     out
 }
+
+/// The gain `K` had to be replaced.
+pub fn predictor_mirrored() -> String {
+    "the estimated predictor was unstable, so its gain K was replaced by the stable one of the same noise spectrum: \
+     the noise model is uncertain; a longer recording, a lower --order or a longer --past would settle it"
+        .to_owned()
+}

@@ -36,8 +36,8 @@ pub fn discrete_lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f
 /// stabilising solution of the Riccati equation of the same innovation process, which mirrors those
 /// eigenvalues and leaves the spectrum of the output (up to its scale) as it is.
 ///
-/// With `F = A - K C` the equation has no constant term, so it reduces to a Lyapunov equation on the
-/// unstable left-invariant subspace of `F` (spectral factorisation; Anderson & Moore, *Optimal
+/// With `F = A - K C` the equation has no constant term: the range of its solution is invariant under `F`, so
+/// it reduces to a Lyapunov equation on the unstable invariant subspace of `F` (spectral factorisation; Anderson & Moore, *Optimal
 /// Filtering*, section 9.3). Returns the gain and the new innovation covariance.
 ///
 /// # Errors
@@ -51,7 +51,7 @@ pub fn stabilising_observer_gain(
     let what = "observer gain";
     let f = a - k * c;
     let n = f.nrows();
-    let decomposition = eigen(&f.transpose())?;
+    let decomposition = eigen(&f)?;
     let mut basis: Vec<nalgebra::DVector<f64>> = Vec::new();
     for (j, value) in decomposition.values.iter().enumerate() {
         if value.norm() > 1.0 && value.im >= 0.0 {
@@ -107,6 +107,29 @@ mod tests {
         let residual = &a * &p * a.transpose() + &q - &p;
         assert!(residual.amax() < 1e-12 * p.amax());
         assert!(discrete_lyapunov(&(a * 1.2), &q).is_err());
+    }
+
+    #[test]
+    fn gain_keeps_the_spectrum_at_any_order() {
+        let a = DMatrix::from_row_slice(3, 3, &[0.9, 0.3, 0.0, -0.2, 0.7, 0.4, 0.1, 0.0, 0.5]);
+        let c = DMatrix::from_row_slice(2, 3, &[1.0, 0.0, 0.5, 0.0, 1.0, -0.3]);
+        let k = DMatrix::from_row_slice(3, 2, &[2.5, 0.4, -0.3, -1.2, 0.8, 0.6]);
+        let lambda = DMatrix::from_row_slice(2, 2, &[1.0, 0.2, 0.2, 0.5]);
+        assert!(spectral_radius(&(&a - &k * &c)).unwrap() > 1.0);
+        let (gain, innovation) = stabilising_observer_gain(&a, &c, &k, &lambda).unwrap();
+        assert!(spectral_radius(&(&a - &gain * &c)).unwrap() < 1.0);
+        // H Lambda H* is the same on the unit circle.
+        let spectrum = |k: &DMatrix<f64>, lambda: &DMatrix<f64>, w: f64| {
+            let complex = |m: &DMatrix<f64>| m.map(|v| num_complex::Complex64::new(v, 0.0));
+            let z = num_complex::Complex64::from_polar(1.0, w);
+            let resolvent = (DMatrix::identity(3, 3) * z - complex(&a)).try_inverse().unwrap();
+            let h = complex(&c) * resolvent * complex(k) + DMatrix::identity(2, 2);
+            &h * complex(lambda) * h.adjoint()
+        };
+        for w in [0.0, 0.3, 1.0, 2.0, 3.1] {
+            let (old, new) = (spectrum(&k, &lambda, w), spectrum(&gain, &innovation, w));
+            assert!((&old - &new).norm() < 1e-10 * old.norm(), "w = {w}");
+        }
     }
 
     #[test]

@@ -21,7 +21,7 @@ use crate::model::{Predictor, StateSpace};
 use crate::moments::{Detrend, Gram, LagAccumulator};
 
 /// Pairs of models drawn, one on either side of the estimate.
-const PAIRS: usize = 4;
+const PAIRS: usize = 3;
 /// The draws are the same in every run.
 const SEED: u64 = 20_080_512;
 

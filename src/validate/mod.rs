@@ -21,17 +21,28 @@
 //!   past residuals.
 //! - *Parameter errors.* Residuals come from estimated parameters. Their covariance widens the covariance of
 //!   the correlations on a fresh record and narrows it on the record estimated from, see `statistic`; the
-//!   degrees of freedom follow from its rank.
+//!   degrees of freedom follow from its rank. What first-order theory misses on a fresh record (`curvature`)
+//!   widens it too.
 //! - *Offsets.* Means over the record are taken out of inputs and residuals, and reported with the fit.
 //!
 //! Because everything is significant in a long record, each test says which share of the variance it is
 //! about (`R^2`, adjusted for degrees of freedom).
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `residuals`, `fit_measure` | the one pass over the records |
+//! | `partial`, `own_past` | partial correlations from lag products; how much past to allow for |
+//! | `filters`, `sensitivity`, `curvature` | what the errors of the parameters do, first and second order |
+//! | `statistic` | statistic, degrees of freedom, bounds |
+//! | `innovation_size` | residual variance against the stated one |
+//! | `verdict` | which tests reject together, and the sentences |
 //!
 //! Source: Ljung, *System Identification*, 2nd ed. (1999), chapter 16.
 
 mod check;
 mod curvature;
 mod error;
+mod filters;
 mod fit_measure;
 mod innovation_size;
 mod options;

@@ -20,13 +20,10 @@ use nalgebra::DMatrix;
 use self::linearised::{boundary_gradient, linearise};
 use self::predictor::Problem;
 pub use self::predictor::predictor_coefficients;
-use super::stable::with_poles_inside;
+use super::stable::{with_poles_inside, with_stable_predictor};
 use super::varx::Varx;
 use crate::covariance::{ParameterCovariance, ParameterLayout};
-use crate::linalg::{
-    LinalgError, cholesky_upper, multiply_nt, solve_upper_transposed, spectral_radius,
-    stabilising_observer_gain,
-};
+use crate::linalg::{LinalgError, cholesky_upper, multiply_nt, solve_upper_transposed};
 use crate::model::StateSpace;
 
 /// The iteration ends when a step promises less than this in the cost, which is in units of chi-square:
@@ -53,9 +50,6 @@ const TRIES: [(f64, f64); 9] = [
 const FLAT_STEPS: usize = 3;
 /// See [`FLAT_STEPS`]; in units of chi-square.
 const GAIN: f64 = 1e-5;
-/// Radius of `A - K C` beyond which the predictor is replaced by its stabilised mirror image before the
-/// first step: powers of it up to the past window would overflow the regression.
-const LARGEST_PREDICTOR_RADIUS: f64 = 0.9999;
 
 /// Result of the polish, in scaled units.
 #[derive(Debug, Clone)]
@@ -94,16 +88,9 @@ pub fn polish(
         feedthrough: varx.feedthrough,
     };
     let problem = Problem::new(varx, layout)?;
-    let mut system = start.clone();
-    if spectral_radius(&(&system.a - &system.k * &system.c))? > LARGEST_PREDICTOR_RADIUS {
-        let (gain, _) = stabilising_observer_gain(
-            &system.a,
-            &system.c,
-            &system.k,
-            &varx.innovation_covariance,
-        )?;
-        system.k = gain;
-    }
+    // Powers of an unstable predictor up to the past window would overflow the regression.
+    let mut system =
+        with_stable_predictor(start, &varx.innovation_covariance).unwrap_or_else(|| start.clone());
     let rank = layout.identifiable();
     let start_cost = problem.cost(&system);
     if !start_cost.is_finite() {

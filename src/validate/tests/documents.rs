@@ -218,18 +218,18 @@ fn several_records_count_as_one() {
         plant.record(300, 2),
         plant.record(900, 3),
     ];
-    let columns: Vec<(Vec<&[f64]>, Vec<&[f64]>)> = logs
+    let columns: Vec<[Vec<&[f64]>; 2]> = logs
         .iter()
         .map(|log| {
-            (
+            [
                 log.input_data.iter().map(Vec::as_slice).collect(),
                 log.output_data.iter().map(Vec::as_slice).collect(),
-            )
+            ]
         })
         .collect();
     let records: Vec<RecordView<'_>> = columns
         .iter()
-        .map(|(inputs, outputs)| RecordView { inputs, outputs })
+        .map(|[inputs, outputs]| RecordView { inputs, outputs })
         .collect();
     let fit = identified(&plant.record(3000, 9), 3);
     let v = validate(
