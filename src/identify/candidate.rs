@@ -1,12 +1,13 @@
 //! One order, estimated, polished and tested.
 
+use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::error::IdentifyError;
 use super::pbsid_opt::{Decomposition, Estimate, system_matrices};
 use super::polish::{Polished, polish};
 use super::stable::with_stable_predictor;
-use super::truncation::truncation;
+use super::truncation::{state_covariance, truncation};
 use super::varx::Varx;
 use crate::model::StateSpace;
 use crate::moments::RFactor;
@@ -20,7 +21,11 @@ pub struct Candidate {
     pub estimate: Estimate,
     /// Maximum likelihood, when it was tried and the iteration converged.
     pub polished: Option<Polished>,
-    /// Truncation measure of the past window.
+    /// The best estimate there is, with a stable predictor.
+    pub predictor: StateSpace,
+    /// Covariance of its state.
+    pub state_covariance: DMatrix<f64>,
+    /// Its truncation measure for the past window.
     pub truncation: f64,
 }
 
@@ -54,19 +59,6 @@ impl Window<'_> {
             decomposition.state_map(order),
             self.sample_time,
         )?;
-        let innovation_covariance = &self.varx.innovation_covariance;
-        let measure = |system: &StateSpace| {
-            let stable = with_stable_predictor(system, innovation_covariance);
-            truncation(
-                stable.as_ref().unwrap_or(system),
-                &estimate.state_covariance,
-                innovation_covariance,
-                self.varx.past,
-                self.varx.columns,
-            )
-            .unwrap_or(f64::INFINITY)
-        };
-        let mut truncation = measure(&estimate.system);
         let polished = if self.polish {
             polish(&estimate.system, self.varx, None)
                 .ok()
@@ -74,13 +66,25 @@ impl Window<'_> {
         } else {
             None
         };
-        if let Some(polished) = &polished {
-            truncation = truncation.max(measure(&polished.system));
-        }
+        let innovation_covariance = &self.varx.innovation_covariance;
+        let best = polished.as_ref().map_or(&estimate.system, |p| &p.system);
+        let predictor =
+            with_stable_predictor(best, innovation_covariance).unwrap_or_else(|| best.clone());
+        let state_covariance = state_covariance(&predictor, self.varx);
+        let truncation = truncation(
+            &predictor,
+            &state_covariance,
+            innovation_covariance,
+            self.varx.past,
+            self.varx.columns,
+        )
+        .unwrap_or(f64::INFINITY);
         Ok(Candidate {
             order,
             estimate,
             polished,
+            predictor,
+            state_covariance,
             truncation,
         })
     }

@@ -77,10 +77,9 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
             {
                 break;
             }
-            let system = selection.system();
             let wanted = past_for_truncation(
-                system,
-                &selection.candidate.estimate.state_covariance,
+                &selection.candidate.predictor,
+                &selection.candidate.state_covariance,
                 &chosen.varx.innovation_covariance,
                 TRUNCATION_TARGET,
                 past + 1,

@@ -150,8 +150,6 @@ pub struct Estimate {
     pub state_regression: DMatrix<f64>,
     /// `zeta [xhat; (u)]^+`, `(p+1) q x (n (+ r))`.
     pub output_regression: DMatrix<f64>,
-    /// Covariance of the estimated state.
-    pub state_covariance: DMatrix<f64>,
 }
 
 /// Least-squares recovery of the system matrices (33)-(34) for the given map to the state. All windows
@@ -210,7 +208,6 @@ pub fn system_matrices(
 
     // zeta Phi^+ = R' (R Phi')^+'.
     let regression = |inverse: &DMatrix<f64>| multiply(inverse, &factor.r).transpose();
-    let past_state = multiply_nt(&factor.r.view((0, 0), (width, width)).into_owned(), &state);
     Ok(Estimate {
         system: StateSpace {
             a: abk.columns(0, n).into_owned(),
@@ -226,7 +223,6 @@ pub fn system_matrices(
         },
         state_regression: regression(&state_inverse),
         output_regression: regression(&output_inverse),
-        state_covariance: multiply_tn(&past_state, &past_state) / factor.columns as f64,
         state_map,
     })
 }

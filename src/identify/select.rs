@@ -8,7 +8,6 @@ use super::order::{self, OrderEvidence};
 use super::pbsid_opt::{Decomposition, Weight, decompose};
 use super::varx::Varx;
 use crate::linalg::spectral_radius;
-use crate::model::StateSpace;
 use crate::moments::RFactor;
 
 /// Innovations of two outputs that differ more in size (in the user's units) make the identity weight a
@@ -41,16 +40,6 @@ pub struct Selection {
     pub explanation: String,
     /// Whether the record is noise-free to rounding.
     pub noise_free: bool,
-}
-
-impl Selection {
-    /// The best estimate there is.
-    pub fn system(&self) -> &StateSpace {
-        self.candidate
-            .polished
-            .as_ref()
-            .map_or(&self.candidate.estimate.system, |p| &p.system)
-    }
 }
 
 /// Estimates the orders that come into question and chooses among them.

@@ -1,6 +1,9 @@
 //! What the past window cuts off.
 
-use crate::linalg::{LinalgError, cholesky_upper, solve_upper_transposed};
+use super::varx::Varx;
+use crate::linalg::{
+    LinalgError, cholesky_upper, multiply_nt, multiply_tn, solve_upper_transposed,
+};
 use crate::model::StateSpace;
 use nalgebra::DMatrix;
 
@@ -8,6 +11,28 @@ use nalgebra::DMatrix;
 /// a chi-square cost whose standard deviation is several units, so one unit is beyond detection; PBSID_opt
 /// itself tolerates about a hundred.
 pub const LARGEST_FOR_POLISH: f64 = 1.0;
+
+/// Covariance over the record of the state that the predictor of `system` makes of each past window,
+/// `sum_i At^i [B~ K] z[k-1-i]`, in the basis of `system`.
+pub fn state_covariance(system: &StateSpace, varx: &Varx) -> DMatrix<f64> {
+    let (n, inputs, outputs) = (system.states(), system.inputs(), system.outputs());
+    let q = inputs + outputs;
+    let predictor = &system.a - &system.k * &system.c;
+    let mut column = DMatrix::zeros(n, q);
+    column
+        .columns_mut(0, inputs)
+        .copy_from(&(&system.b - &system.k * &system.d));
+    column.columns_mut(inputs, outputs).copy_from(&system.k);
+    let width = varx.past * q;
+    let mut state_of_past = DMatrix::zeros(n, width);
+    for block in (0..varx.past).rev() {
+        state_of_past.columns_mut(block * q, q).copy_from(&column);
+        column = &predictor * column;
+    }
+    let past_factor = varx.regressor_factor.view((0, 0), (width, width));
+    let state = multiply_nt(&past_factor.into_owned(), &state_of_past);
+    multiply_tn(&state, &state) / varx.columns as f64
+}
 
 /// `eta_p = Nc tr(Lambda^-1 C At^p P At^p' C')`: the increase of the chi-square cost to be expected because
 /// the state at the beginning of the past window is not in the regression, `At = A - K C`, `P` the

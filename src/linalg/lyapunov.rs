@@ -122,7 +122,9 @@ mod tests {
         let spectrum = |k: &DMatrix<f64>, lambda: &DMatrix<f64>, w: f64| {
             let complex = |m: &DMatrix<f64>| m.map(|v| num_complex::Complex64::new(v, 0.0));
             let z = num_complex::Complex64::from_polar(1.0, w);
-            let resolvent = (DMatrix::identity(3, 3) * z - complex(&a)).try_inverse().unwrap();
+            let resolvent = (DMatrix::identity(3, 3) * z - complex(&a))
+                .try_inverse()
+                .unwrap();
             let h = complex(&c) * resolvent * complex(k) + DMatrix::identity(2, 2);
             &h * complex(lambda) * h.adjoint()
         };
