@@ -19,7 +19,8 @@ pub struct Candidate {
     pub order: usize,
     /// PBSID_opt.
     pub estimate: Estimate,
-    /// Maximum likelihood, when it was tried and the iteration converged.
+    /// Maximum likelihood, when it was tried. An iteration that did not converge has still gone downhill: its
+    /// cost is an upper bound of the smallest.
     pub polished: Option<Polished>,
     /// The best estimate there is, with a stable predictor.
     pub predictor: StateSpace,
@@ -60,9 +61,7 @@ impl Window<'_> {
             self.sample_time,
         )?;
         let polished = if self.polish {
-            polish(&estimate.system, self.varx, None)
-                .ok()
-                .filter(|p| p.converged)
+            polish(&estimate.system, self.varx, None).ok()
         } else {
             None
         };

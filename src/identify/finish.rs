@@ -23,6 +23,10 @@ use crate::model::StateSpace;
 /// Singular values that are reported.
 const SINGULAR_VALUES_KEPT: usize = 40;
 
+/// The polish is also used when it gains this many times more (in chi-square) than the truncation can distort:
+/// then the estimate that it starts from is the poorer one by far.
+const GAIN_OVER_TRUNCATION: f64 = 10.0;
+
 /// Everything decided before the final numbers.
 pub struct Chosen {
     /// Data of the past window.
@@ -63,7 +67,10 @@ pub fn finish(options: &Options, data: &Data, chosen: Chosen) -> Result<Fit, Ide
     let use_polish = match options.polish {
         Polish::Never => false,
         Polish::Always => true,
-        Polish::Auto => candidate.truncation <= LARGEST_FOR_POLISH,
+        Polish::Auto => candidate.polished.as_ref().is_some_and(|p| {
+            candidate.truncation <= LARGEST_FOR_POLISH
+                || p.start_cost - p.cost > GAIN_OVER_TRUNCATION * candidate.truncation
+        }),
     };
     let polished = candidate.polished.filter(|_| use_polish);
     let order_test = polished.as_ref().map(|p| OrderTest {
@@ -172,6 +179,9 @@ pub fn finish(options: &Options, data: &Data, chosen: Chosen) -> Result<Fit, Ide
         warnings: Vec::new(),
     };
     summary.warnings = warnings::of_fit(&summary, &varx, noise_free, options);
+    if polished.as_ref().is_some_and(|p| !p.converged) {
+        summary.warnings.push(warnings::not_converged());
+    }
     if predictor_mirrored && !noise_free {
         summary.warnings.push(warnings::predictor_mirrored());
     }

@@ -208,8 +208,8 @@ fn best_by_schwarz(
 }
 
 /// The singular value criterion proposes; the chi-square test moves the order up while it rejects, and down
-/// while it does not. An order whose model cannot be polished is too high for the record: only orders below
-/// it are looked at then.
+/// while it does not. An order whose model cannot be computed is too high for the record: only orders below it
+/// are looked at then.
 fn choose_order(
     evidence: &mut Vec<OrderEvidence>,
     varx: &Varx,

@@ -8,8 +8,16 @@ use crate::model::{ModelError, estimate_initial_state};
 impl Model {
     /// Inputs as deviations from the operating point, delayed by the known delays; before the first sample
     /// they stand still.
-    fn input_deviations(&self, inputs: &[&[f64]]) -> Vec<Vec<f64>> {
-        self.inputs
+    fn input_deviations(&self, inputs: &[&[f64]]) -> Result<Vec<Vec<f64>>, ModelError> {
+        if inputs.len() != self.inputs.len() {
+            return Err(ModelError::Channels {
+                kind: "inputs",
+                given: inputs.len(),
+                expected: self.inputs.len(),
+            });
+        }
+        Ok(self
+            .inputs
             .iter()
             .zip(inputs)
             .map(|(channel, column)| {
@@ -17,7 +25,7 @@ impl Model {
                     .map(|k| column[k.saturating_sub(channel.delay)] - channel.level)
                     .collect()
             })
-            .collect()
+            .collect())
     }
 
     /// Free run from the inputs alone, `y = level + system(u - level)`, known delays applied.
@@ -33,7 +41,7 @@ impl Model {
         inputs: &[&[f64]],
         initial_state: Option<&DVector<f64>>,
     ) -> Result<Vec<Vec<f64>>, ModelError> {
-        let inputs = self.input_deviations(inputs);
+        let inputs = self.input_deviations(inputs)?;
         let slices: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
         let mut outputs = self.system.simulate(&slices, initial_state)?;
         for (column, channel) in outputs.iter_mut().zip(&self.outputs) {
@@ -54,7 +62,7 @@ impl Model {
         inputs: &[&[f64]],
         outputs: &[&[f64]],
     ) -> Result<DVector<f64>, ModelError> {
-        let inputs = self.input_deviations(inputs);
+        let inputs = self.input_deviations(inputs)?;
         let outputs: Vec<Vec<f64>> = self
             .outputs
             .iter()
@@ -84,7 +92,7 @@ mod tests {
             *value = 5.0 + 0.1 * *value;
         }
         for value in &mut log.output_data[0] {
-            *value = 300.0 + *value;
+            *value += 300.0;
         }
         let options = Options {
             order: Order::Fixed(3),

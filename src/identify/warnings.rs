@@ -103,3 +103,10 @@ pub fn predictor_mirrored() -> String {
      the noise model is uncertain; a longer recording, a lower --order or a longer --past would settle it"
         .to_owned()
 }
+
+/// The polish ran out of steps.
+pub fn not_converged() -> String {
+    "the polish has not converged: some combination of the parameters is hardly determined by the recording, usually \
+     because the order is too high; compare lower orders with --order"
+        .to_owned()
+}

@@ -414,11 +414,11 @@ mod tests {
         let moments = accumulate(&columns, 3, 1800);
         let linear = moments.trend(Detrend::Linear);
         let mean = moments.trend(Detrend::Mean);
-        for c in 0..3 {
-            let average = columns[c].iter().sum::<f64>() / 1800.0;
+        for (c, column) in columns.iter().enumerate() {
+            let average = column.iter().sum::<f64>() / 1800.0;
             approx::assert_relative_eq!(mean.level[c], average, max_relative = 1e-12);
             let (mut sum, mut weighted) = (0.0, 0.0);
-            for (k, value) in columns[c].iter().enumerate() {
+            for (k, value) in column.iter().enumerate() {
                 let rest = value - linear.at(c, k);
                 sum += rest;
                 weighted += rest * (k as f64 - 899.5);

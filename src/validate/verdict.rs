@@ -104,9 +104,18 @@ pub(super) fn decide(validation: &mut Validation, noise_model: bool) {
         && test.p_value < INFORMATION * level
         && let Some(strongest) = &test.strongest
     {
+        // In closed loop the feedthrough of the plant and that of the controller cannot be told apart.
+        let closed_loop = validation
+            .feedback
+            .as_ref()
+            .is_some_and(|test| test.p_value < INFORMATION * level);
+        let meaning = if closed_loop {
+            "a controller acts without delay; the plant's own direct feedthrough, if any, cannot be told from it"
+        } else {
+            "the plant has direct feedthrough (try --feedthrough), or a controller acts without delay"
+        };
         findings.push(format!(
-            "{} and {} move together within one sample (correlation {:.3}): either the plant has direct \
-             feedthrough (try --feedthrough), or a controller acts without delay",
+            "{} and {} move together within one sample (correlation {:.3}): {meaning}",
             strongest.from, strongest.to, strongest.correlation
         ));
     }

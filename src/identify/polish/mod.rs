@@ -26,9 +26,9 @@ use crate::covariance::{ParameterCovariance, ParameterLayout};
 use crate::linalg::{LinalgError, cholesky_upper, multiply_nt, solve_upper_transposed};
 use crate::model::StateSpace;
 
-/// The iteration ends when a step promises less than this in the cost, which is in units of chi-square:
-/// far below what a standard deviation is (1).
-const DECREASE: f64 = 1e-9;
+/// The iteration ends when a step promises less than this in the cost, which is in units of chi-square: the
+/// parameters are then within 1e-6 standard deviations of the minimum, whatever start they came from.
+const DECREASE: f64 = 1e-12;
 /// A Gauss-Newton iteration that has not ended by then will not.
 const ITERATIONS: usize = 60;
 /// Steps of which the one that decreases the cost most is taken: length of the step, and Levenberg-Marquardt
