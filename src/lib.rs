@@ -1,4 +1,60 @@
-//! innovant
+//! State-space models with honest uncertainty from recordings, also in closed loop.
+//!
+//! Given samples of the inputs `u` and outputs `y` of a plant, find
+//!
+//! ```text
+//! x[k+1] = A x[k] + B u[k] + K e[k]
+//! y[k]   = C x[k] + D u[k] + e[k],      e white, cov(e) = Lambda,
+//! ```
+//!
+//! together with the covariance of `A, B, K, C, D`, what follows from it for everything that does not depend on
+//! the choice of the state (frequency response, poles, zeros, step response), and tests that tell whether the
+//! model is to be believed. `e` is the *innovation*: what a model could not foresee.
+//!
+//! ```
+//! use innovant::{Options, identify, systems};
+//!
+//! // Two inputs, two outputs, under feedback: u = 0.5 y + reference.
+//! let recording = systems::van_wingerden_one().record(2000, 1);
+//! let model = identify(&[recording], &Options::default())?;
+//!
+//! assert_eq!(model.system.states(), 4);
+//! let covariance = model.covariance.as_ref().ok_or("identified models have one")?;
+//! for pole in innovant::covariance::pole_uncertainties(&model.system, covariance)? {
+//!     println!("{:.3} +- {:.3} rad/s", pole.pole.natural_frequency, pole.natural_frequency_std.unwrap_or(f64::NAN));
+//! }
+//! println!("{model}");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # The map
+//!
+//! Data flow one way; each arrow is one module calling the next, and none points back:
+//!
+//! ```text
+//! CSV ── log ──> Log ── moments ──> R factor ── identify ──> Model + covariance ── validate ──> residual tests
+//!                                                                  └──────── report, cli ────────┘
+//! ```
+//!
+//! | module | what it is for |
+//! |---|---|
+//! | [`log`] | recordings: CSV in and out, column roles, units, sampling |
+//! | [`moments`] | one pass over the data: lag moments, and from them the triangular factor `R` |
+//! | [`identify`](mod@identify) | windows, order, PBSID_opt, polish to maximum likelihood, the [`Model`] |
+//! | [`model`] | what a state-space system does: simulate, predict, frequency response, poles, zeros |
+//! | [`covariance`] | the covariance of the parameters, and of what follows from them |
+//! | [`validate`] | fit, and residual tests that stay honest in closed loop and under coloured noise |
+//! | [`report`] | JSON documents with their schema, tables for people |
+//! | [`cli`] | the command line |
+//! | [`linalg`] | the only place that names faer |
+//! | [`systems`] | the papers' examples, simulated, for tests and benchmarks |
+//!
+//! # References
+//! - J.W. van Wingerden, *The asymptotic variance of the PBSIDopt algorithm* (equation numbers in this
+//!   documentation are that paper's; its printed sign of the terms beta in Appendix B is wrong, see
+//!   [`covariance`]).
+//! - A. Chiuso, G. Picci, *Estimating the asymptotic variance of closed loop subspace estimators*.
+
 pub mod cli;
 pub mod covariance;
 pub mod identify;

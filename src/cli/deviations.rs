@@ -10,7 +10,7 @@ use crate::validate::{
 
 /// Values of a long recording that the residual tests look at, from its beginning: more do not sharpen their
 /// verdict, but cost time and memory.
-const VALUES_TESTED: usize = 1 << 20;
+const VALUES_TESTED: usize = 1 << 19;
 
 /// One experiment.
 #[derive(Debug)]

@@ -3,6 +3,12 @@
 //! Everything that is reported is carried over from the parameters to first order (the delta method), with
 //! gradients in closed form; where that is not to be trusted, models are drawn instead.
 //!
+//! Of PBSID_opt it is van Wingerden's (41), written without any matrix as long as the record and checked against
+//! the literal form to 1e-13. The terms beta of his Appendix B carry a **plus**: the residual is
+//! `Ehat = E - E Pi_Z`, so its error is `-E Pi_Z`, and the printed minus of (B.2) and (B.4) is wrong. With a
+//! predictor that is exactly nilpotent the propagation is an identity, which settles the sign
+//! (`tests/literal_covariance.rs`).
+//!
 //! | file | what it holds |
 //! |---|---|
 //! | `parameters` | [`ParameterCovariance`] and the order of the parameters |
