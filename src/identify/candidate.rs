@@ -5,7 +5,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::error::IdentifyError;
 use super::pbsid_opt::{Decomposition, Estimate, system_matrices};
-use super::polish::{Polished, polish};
+use super::polish::{Effort, Polished, polish};
 use super::stable::with_stable_predictor;
 use super::truncation::{state_covariance, truncation};
 use super::varx::Varx;
@@ -31,7 +31,7 @@ pub struct Candidate {
 }
 
 /// Everything that candidates of one past window share.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub struct Window<'a> {
     /// Data.
     pub factor: &'a RFactor,
@@ -41,6 +41,8 @@ pub struct Window<'a> {
     pub sample_time: f64,
     /// Whether candidates are polished.
     pub polish: bool,
+    /// And how far.
+    pub effort: Effort,
 }
 
 impl Window<'_> {
@@ -61,7 +63,7 @@ impl Window<'_> {
             self.sample_time,
         )?;
         let polished = if self.polish {
-            polish(&estimate.system, self.varx, None).ok()
+            polish(&estimate.system, self.varx, None, self.effort).ok()
         } else {
             None
         };

@@ -6,7 +6,7 @@ use super::error::IdentifyError;
 use super::fit::Fit;
 use super::options::{CovarianceKind, Options, Order, Polish};
 use super::pbsid_opt::{Estimate, Weight, decompose, system_matrices};
-use super::polish::{Polished, coefficient_cost, polish};
+use super::polish::{Effort, Polished, coefficient_cost, polish};
 use super::scaling;
 use super::select::{Selection, Windowed};
 use super::stable::{largest_stable_radius, stabilised, with_poles_inside, with_stable_predictor};
@@ -53,7 +53,7 @@ pub fn finish(options: &Options, data: &Data, chosen: Chosen) -> Result<Fit, Ide
     let Windowed { factor, varx } = windowed;
     let Selection {
         candidate,
-        decomposition,
+        singular_values,
         weight,
         future,
         evidence,
@@ -161,11 +161,9 @@ pub fn finish(options: &Options, data: &Data, chosen: Chosen) -> Result<Fit, Ide
                 .truncation
                 .is_finite()
                 .then_some(candidate.truncation),
-            singular_values: decomposition
-                .singular_values
-                .iter()
+            singular_values: singular_values
+                .into_iter()
                 .take(SINGULAR_VALUES_KEPT.max(order + 5))
-                .copied()
                 .collect(),
             spectral_radius: spectral_radius(&system.a)?,
             predictor_radius: spectral_radius(&(&system.a - &system.k * &system.c))?,
@@ -231,7 +229,7 @@ fn make_stable(system: &StateSpace, varx: &Varx) -> Result<Option<MadeStable>, I
         });
     }
     // Against the best model of the same order without the constraint.
-    let free = polish(system, varx, None)
+    let free = polish(system, varx, None, Effort::Full)
         .map(|p| p.cost)
         .or_else(|_| coefficient_cost(system, varx))
         .unwrap_or(f64::NAN);
@@ -268,7 +266,9 @@ fn replicates(data: &Data, options: &Options, of: &Replicated<'_>) -> Vec<StateS
         .filter_map(|part| {
             let part_varx = varx(part, options.feedthrough).ok()?;
             if of.polished {
-                return polish(of.system, &part_varx, None).ok().map(|p| p.system);
+                return polish(of.system, &part_varx, None, Effort::Full)
+                    .ok()
+                    .map(|p| p.system);
             }
             let decomposition = decompose(part, &part_varx, of.future, of.weight).ok()?;
             let map = of.estimate.state_map.clone();

@@ -47,7 +47,7 @@ pub use model::{IdentifiedChannel, Model, identify, identify_records};
 pub use options::{CovarianceKind, Options, Order, Polish};
 pub use order::OrderEvidence;
 pub use pbsid_opt::{Decomposition, Estimate, Weight, decompose, system_matrices};
-pub use polish::{Polished, coefficient_cost, polish, predictor_coefficients};
+pub use polish::{Effort, Polished, coefficient_cost, polish, predictor_coefficients};
 pub use records::{FileRecords, MemoryRecords, ReadProgress, Recording, Records};
 pub use summary::{Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary};
 pub use varx::{Varx, varx};

@@ -6,6 +6,7 @@ use super::horizon;
 use super::options::{Options, Order, Polish};
 use super::order::{self, OrderEvidence};
 use super::pbsid_opt::{Decomposition, Weight, decompose};
+use super::polish::Effort;
 use super::varx::Varx;
 use crate::linalg::spectral_radius;
 use crate::moments::RFactor;
@@ -28,9 +29,9 @@ pub struct Windowed {
 pub struct Selection {
     /// The model of that order.
     pub candidate: Candidate,
-    /// Decomposition that it came from.
-    pub decomposition: Decomposition,
-    /// Its weight.
+    /// Singular values of the decomposition that it came from.
+    pub singular_values: Vec<f64>,
+    /// Weight of that decomposition.
     pub weight: Weight,
     /// Future window.
     pub future: usize,
@@ -58,16 +59,14 @@ pub fn select(
         .diagonal()
         .iter()
         .any(|v| *v < NOISE_FREE);
-    let window = Window {
+    let polish = !noise_free && options.polish != Polish::Never;
+    // The referee of the order needs a polished cost also when no polish was asked for.
+    let referee = Window {
         factor,
         varx,
         sample_time,
-        polish: !noise_free && options.polish != Polish::Never,
-    };
-    // Only the referee of the order needs a polished cost when no polish was asked for.
-    let referee = Window {
         polish: !noise_free,
-        ..window
+        effort: Effort::Referee,
     };
     let weight = options
         .weight
@@ -87,32 +86,18 @@ pub fn select(
         possible.min(largest.max(order::LARGEST_AUTOMATIC_ORDER)),
     );
 
-    let future_for = |n: usize| {
-        options
-            .future
-            .unwrap_or_else(|| horizon::future_for_order(past, outputs, n))
+    let mut estimator = Estimator {
+        window: referee,
+        weight,
+        future: options.future,
+        decompositions: Vec::new(),
+        candidates: Vec::new(),
     };
-    let estimate = |n: usize,
-                    window: &Window<'_>|
-     -> Result<(Candidate, Decomposition), IdentifyError> {
-        let decomposition = decompose(factor, varx, future_for(n), weight)?;
-        let possible = decomposition.largest_order();
-        if n > possible {
-            return Err(IdentifyError::Order {
-                order: n,
-                largest: possible,
-                reason: "the recording shows no more states than that in these windows".to_owned(),
-            });
-        }
-        Ok((window.candidate(&decomposition, n)?, decomposition))
-    };
-
     let (order, explanation) = match &options.order {
         Order::Fixed(n) => (*n, format!("order {n}: as asked")),
         Order::Compare(list) => {
             for n in list {
-                let (candidate, _) = estimate(*n, &referee)?;
-                note(&mut evidence, &candidate, varx);
+                note(&mut evidence, estimator.candidate(*n)?, varx);
             }
             let best = best_by_schwarz(&evidence, |e| list.contains(&e.order)).unwrap_or(list[0]);
             (
@@ -120,23 +105,86 @@ pub fn select(
                 format!("order {best}: smallest Schwarz criterion of those asked for"),
             )
         }
-        Order::Auto => choose_order(&mut evidence, varx, &mut |n| {
-            estimate(n, &referee).ok().map(|(candidate, _)| candidate)
-        }),
+        Order::Auto => choose_order(&mut evidence, varx, &mut estimator),
     };
-    let (candidate, decomposition) = estimate(order, &window)?;
-    if window.polish {
+    estimator.for_good(polish);
+    let candidate = estimator.candidate(order)?.clone();
+    if polish {
         note(&mut evidence, &candidate, varx);
     }
+    let future = estimator.future_for(order);
     Ok(Selection {
-        future: future_for(order),
+        future,
         candidate,
-        decomposition,
+        singular_values: estimator.decomposition(future)?.singular_values.clone(),
         weight,
         evidence,
         explanation,
         noise_free,
     })
+}
+
+/// Estimates orders of one past window, each once, and decomposes each future window once.
+struct Estimator<'a> {
+    window: Window<'a>,
+    weight: Weight,
+    future: Option<usize>,
+    decompositions: Vec<(usize, Decomposition)>,
+    candidates: Vec<Candidate>,
+}
+
+impl Estimator<'_> {
+    /// From here on candidates are final: what the referee was content with is estimated again.
+    fn for_good(&mut self, polish: bool) {
+        let converged = |c: &Candidate| c.polished.as_ref().is_some_and(|p| p.converged);
+        self.candidates.retain(|c| polish && converged(c));
+        self.window.polish = polish;
+        self.window.effort = Effort::Full;
+    }
+
+    fn future_for(&self, order: usize) -> usize {
+        let factor = self.window.factor;
+        self.future
+            .unwrap_or_else(|| horizon::future_for_order(factor.past, factor.outputs, order))
+    }
+
+    fn decomposition(&mut self, future: usize) -> Result<&Decomposition, IdentifyError> {
+        let known = self.decompositions.iter().position(|(f, _)| *f == future);
+        let index = match known {
+            Some(index) => index,
+            None => {
+                let Window { factor, varx, .. } = self.window;
+                let made = decompose(factor, varx, future, self.weight)?;
+                self.decompositions.push((future, made));
+                self.decompositions.len() - 1
+            }
+        };
+        Ok(&self.decompositions[index].1)
+    }
+
+    fn candidate(&mut self, order: usize) -> Result<&Candidate, IdentifyError> {
+        let known = self.candidates.iter().position(|c| c.order == order);
+        let index = match known {
+            Some(index) => index,
+            None => {
+                let window = self.window;
+                let decomposition = self.decomposition(self.future_for(order))?;
+                let possible = decomposition.largest_order();
+                if order > possible {
+                    return Err(IdentifyError::Order {
+                        order,
+                        largest: possible,
+                        reason: "the recording shows no more states than that in these windows"
+                            .to_owned(),
+                    });
+                }
+                let made = window.candidate(decomposition, order)?;
+                self.candidates.push(made);
+                self.candidates.len() - 1
+            }
+        };
+        Ok(&self.candidates[index])
+    }
 }
 
 fn automatic_weight(factor: &RFactor, varx: &Varx) -> Weight {
@@ -213,13 +261,13 @@ fn best_by_schwarz(
 fn choose_order(
     evidence: &mut Vec<OrderEvidence>,
     varx: &Varx,
-    estimate: &mut dyn FnMut(usize) -> Option<Candidate>,
+    estimator: &mut Estimator<'_>,
 ) -> (usize, String) {
     let proposal = order::proposal(evidence).unwrap_or(1);
     let largest = evidence.len().max(1);
     let mut test = |evidence: &mut Vec<OrderEvidence>, n: usize| {
-        if let Some(candidate) = estimate(n) {
-            note(evidence, &candidate, varx);
+        if let Ok(candidate) = estimator.candidate(n) {
+            note(evidence, candidate, varx);
         }
     };
     let find = |evidence: &[OrderEvidence], n: usize| -> Option<OrderEvidence> {

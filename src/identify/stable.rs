@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::polish::{Polished, polish};
+use super::polish::{Effort, Polished, polish};
 use super::varx::Varx;
 use crate::linalg::{LinalgError, eigen, spectral_radius, stabilising_observer_gain};
 use crate::model::StateSpace;
@@ -55,7 +55,7 @@ pub fn with_poles_inside(system: &StateSpace, radius: f64) -> Result<StateSpace,
 pub fn stabilised(start: &StateSpace, varx: &Varx) -> Result<Polished, LinalgError> {
     let radius = largest_stable_radius(varx.columns);
     let inside = with_poles_inside(start, radius)?;
-    polish(&inside, varx, Some(radius))
+    polish(&inside, varx, Some(radius), Effort::Full)
 }
 
 /// Radius of `A - K C` beyond which a predictor counts as unstable.

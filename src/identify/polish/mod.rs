@@ -51,6 +51,20 @@ const FLAT_STEPS: usize = 3;
 /// See [`FLAT_STEPS`]; in units of chi-square.
 const GAIN: f64 = 1e-5;
 
+/// How far to go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effort {
+    /// To the minimum.
+    Full,
+    /// To the minimum, unless it becomes plain that the chi-square test rejects the order anyway.
+    Referee,
+}
+
+/// A cost this many times its degrees of freedom is beyond any acceptance...
+const HOPELESS: f64 = 10.0;
+/// ...once [`FLAT_STEPS`] steps in a row gain less than this share of it.
+const HOPELESS_GAIN: f64 = 0.01;
+
 /// Result of the polish, in scaled units.
 #[derive(Debug, Clone)]
 pub struct Polished {
@@ -80,6 +94,7 @@ pub fn polish(
     start: &StateSpace,
     varx: &Varx,
     largest_radius: Option<f64>,
+    effort: Effort,
 ) -> Result<Polished, LinalgError> {
     let layout = ParameterLayout {
         states: start.states(),
@@ -101,6 +116,9 @@ pub fn polish(
     let mut cost = start_cost;
     let mut iterations = 0;
     let mut flat = 0;
+    let mut slow = 0;
+    let degrees_of_freedom = (layout.outputs * varx.regressors()).saturating_sub(rank);
+    let hopeless = HOPELESS * degrees_of_freedom as f64;
     let mut converged = false;
     let covariance = loop {
         let jacobian = problem.jacobian(&system);
@@ -119,7 +137,7 @@ pub fn polish(
             converged = true;
             break linearised.covariance();
         }
-        if iterations == ITERATIONS {
+        if iterations == ITERATIONS || (effort == Effort::Referee && slow == FLAT_STEPS) {
             break linearised.covariance();
         }
         iterations += 1;
@@ -149,6 +167,12 @@ pub fn polish(
                 } else {
                     0
                 };
+                slow = if candidate_cost > hopeless && cost - candidate_cost < HOPELESS_GAIN * cost
+                {
+                    slow + 1
+                } else {
+                    0
+                };
                 system = candidate;
                 cost = candidate_cost;
             }
@@ -168,7 +192,7 @@ pub fn polish(
         },
         start_cost,
         cost,
-        degrees_of_freedom: (layout.outputs * varx.regressors()).saturating_sub(rank),
+        degrees_of_freedom,
         iterations,
         converged,
     })
@@ -205,7 +229,7 @@ mod tests {
             start.a[(0, 1)] += 0.05;
             start.b[(1, 0)] -= 0.1;
             start.k[(0, 0)] += 0.1;
-            let result = polish(&start, &varx, None).unwrap();
+            let result = polish(&start, &varx, None, Effort::Full).unwrap();
             assert!(result.converged && result.cost < 1e-10 * result.start_cost);
             let found = predictor_coefficients(&result.system, 6, feedthrough);
             assert!((found - &varx.coefficients).amax() < 1e-8);
