@@ -193,7 +193,7 @@ fn options_that_are_not_possible() {
     let delay = about(&good, &["--delay", "1,2"]);
     says(&delay, &["--delay has 2 values", "one for each"]);
     let late = about(&good, &["--delay", "1000"]);
-    says(&late, &["too short"]);
+    says(&late, &["log.csv", "--delay 1000 leaves only 0 samples"]);
 }
 
 #[test]

@@ -13,7 +13,8 @@ use super::roles::RoleFlags;
 use super::terminal::style;
 use super::{Outcome, Verbosity};
 use crate::identify::{
-    CovarianceKind, FileRecords, Model, Options, Order, Polish, Records, Weight, identify_records,
+    CovarianceKind, FileRecords, IdentifyError, Model, Options, Order, Polish, Records, Weight,
+    identify_records,
 };
 use crate::log::{Roles, Source};
 use crate::moments::Detrend;
@@ -193,12 +194,14 @@ impl Plan {
 }
 
 pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
+    let logs: Vec<String> = flags.logs.iter().map(ToString::to_string).collect();
     let plan = Plan::new(flags)?;
     let progress = Progress::over(&plan.sources, say.quiet);
     let started = Instant::now();
     let mut records =
         FileRecords::open(plan.sources, plan.roles)?.with_progress(progress.callback());
-    let mut model = identify_records(&mut records, &plan.options)?;
+    let mut model =
+        identify_records(&mut records, &plan.options).map_err(|error| with_names(error, &logs))?;
     check_recorded_once(&model)?;
     let fitted = started.elapsed();
     let tests = test(&mut records, &mut model)?;
@@ -305,5 +308,20 @@ fn tell(model: &Model, tests: Option<&Validation>) {
     }
     for finding in tests.iter().flat_map(|t| findings(t)) {
         note(&wrapped("finding: ", &finding));
+    }
+}
+
+/// Errors of the log module name their file; the others are about the recordings as a whole.
+fn with_names(error: IdentifyError, logs: &[String]) -> anyhow::Error {
+    match error {
+        IdentifyError::Log(error) => error.into(),
+        error => {
+            let more = match logs.len() {
+                0 | 1 => String::new(),
+                count => format!(" (and {} more)", count - 1),
+            };
+            let first = logs.first().map_or("", String::as_str);
+            anyhow::anyhow!("{first}{more}: {error}")
+        }
     }
 }

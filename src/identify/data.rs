@@ -91,6 +91,15 @@ impl Data {
             samples,
         };
         let smallest = 2 * q + outputs + 2;
+        if let Some(delay) = data.delays.iter().max()
+            && samples < smallest
+            && *delay > 0
+        {
+            return Err(IdentifyError::Option(format!(
+                "--delay {delay} leaves only {samples} samples of the recording, and a model of {q} channels needs at \
+                 least {smallest}; the delay is counted in samples"
+            )));
+        }
         if samples < smallest {
             return Err(IdentifyError::TooFewSamples {
                 samples,
