@@ -4,8 +4,8 @@
 //! `cargo test --release --test monte_carlo -- --nocapture` prints the table.
 
 use innovant::covariance::{
-    Covariance2, ellipse_quantile, frequency_response_covariance, interval_quantile,
-    pole_uncertainties,
+    Covariance2, ellipse_quantile, frequency_response_covariance, impulse_response_std,
+    interval_quantile, pole_uncertainties,
 };
 use innovant::identify::{CovarianceKind, Order, Polish};
 use innovant::systems::{TestSystem, servo, van_wingerden_one};
@@ -170,6 +170,45 @@ fn slow_plant_with_coloured_noise_covers() {
         assert!((91.0..=98.0).contains(&at_95), "{at_95}");
         assert!((96.0..=100.0).contains(&at_99), "{at_99}");
     }
+}
+
+/// First 50 Markov parameters from 1e5 samples in closed loop: the relative Frobenius error is what the stated
+/// covariance, which is the Cramer-Rao bound of a maximum-likelihood estimate, promises.
+#[test]
+fn markov_parameters_are_as_good_as_promised() {
+    const COUNT: usize = 50;
+    let plant = van_wingerden_one();
+    let truth = plant.system.impulse_response(COUNT + 1);
+    let size: f64 = truth.iter().skip(1).map(|h| h.norm_squared()).sum();
+    let errors: Vec<(f64, f64)> = (0..20_u64)
+        .into_par_iter()
+        .map(|run| {
+            let log = plant.record(100_000, 5000 + run);
+            let model = identify(&[log], &Options::default()).unwrap();
+            let found = model.system.impulse_response(COUNT + 1);
+            let square = |k: usize| (&found[k] - &truth[k]).norm_squared();
+            let error: f64 = (1..=COUNT).map(square).sum();
+            let covariance = model.covariance.as_ref().unwrap();
+            let deviations = impulse_response_std(&model.system, covariance, COUNT + 1).unwrap();
+            let promised: f64 = deviations.iter().skip(1).map(|d| d.norm_squared()).sum();
+            (error / size, promised / size)
+        })
+        .collect();
+    let mean = |values: &[(f64, f64)]| {
+        values.iter().map(|(e, _)| e.sqrt()).sum::<f64>() / values.len() as f64
+    };
+    let rms = |pick: fn(&(f64, f64)) -> f64| {
+        (errors.iter().map(pick).sum::<f64>() / errors.len() as f64).sqrt()
+    };
+    let (found, promised) = (rms(|e| e.0), rms(|e| e.1));
+    println!(
+        "Example I, N = 1e5, 50 Markov parameters: mean relative error {:.4} (first 10 draws), {:.4} (20); \
+         rms {found:.4}, promised {promised:.4}",
+        mean(&errors[..10]),
+        mean(&errors)
+    );
+    // 20 squared errors of a few strong directions: the ratio of their mean scatters by about a quarter.
+    assert!((0.5..1.5).contains(&(found / promised)));
 }
 
 /// The jackknife has 18 or more degrees of freedom, and its regions take Student and F quantiles.

@@ -52,15 +52,13 @@ pub fn singular_value_criterion(
     columns: usize,
     largest: usize,
 ) -> Vec<OrderEvidence> {
-    let samples = columns as f64;
     (1..=largest.min(correlations.len()))
         .map(|order| {
             let next = correlations.get(order).copied().unwrap_or(0.0);
-            let parameters = (order * (inputs + 2 * outputs)) as f64;
             OrderEvidence {
                 order,
                 canonical_correlation: correlations[order - 1],
-                singular_value_criterion: next * next + parameters * samples.ln() / samples,
+                singular_value_criterion: next * next + penalty(order, inputs, outputs, columns),
                 chi_square: None,
                 degrees_of_freedom: None,
                 p_value: None,
@@ -69,6 +67,12 @@ pub fn singular_value_criterion(
             }
         })
         .collect()
+}
+
+/// `d(n) log(N) / N`, the price of the parameters of an order.
+pub fn penalty(order: usize, inputs: usize, outputs: usize, columns: usize) -> f64 {
+    let samples = columns as f64;
+    (order * (inputs + 2 * outputs)) as f64 * samples.ln() / samples
 }
 
 /// The order with the smallest criterion.

@@ -211,8 +211,14 @@ fn note(evidence: &mut Vec<OrderEvidence>, candidate: &Candidate, varx: &Varx) {
         None => {
             evidence.push(OrderEvidence {
                 order: candidate.order,
+                // Beyond the last singular value that is not zero only the penalty is left.
                 canonical_correlation: 0.0,
-                singular_value_criterion: f64::MAX,
+                singular_value_criterion: order::penalty(
+                    candidate.order,
+                    candidate.estimate.system.inputs(),
+                    candidate.estimate.system.outputs(),
+                    varx.columns,
+                ),
                 chi_square: None,
                 degrees_of_freedom: None,
                 p_value: None,
