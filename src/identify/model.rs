@@ -135,7 +135,7 @@ fn initial_state(records: &mut dyn Records, fit: &Fit) -> Result<DVector<f64>, I
 }
 
 /// The first samples of an experiment as deviations from its trend, inputs aligned.
-pub fn detrended(
+fn detrended(
     records: &mut dyn Records,
     experiment: usize,
     delays: &[usize],

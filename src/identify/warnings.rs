@@ -48,6 +48,11 @@ pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Option
              raise --past",
             summary.horizons.past
         )),
+        Some(eta) if eta > LARGEST_FOR_POLISH && summary.polished => out.push(format!(
+            "the past window of {} cuts off a part of the noise dynamics (truncation {eta:.1}, better below \
+             {LARGEST_FOR_POLISH}): the uncertainty is somewhat understated; raise --past",
+            summary.horizons.past
+        )),
         Some(eta) if eta > LARGEST_FOR_POLISH && options.polish == Polish::Auto => out.push(format!(
             "not polished to maximum likelihood, because the past window of {} cuts off too much (truncation \
              {eta:.1}, at most {LARGEST_FOR_POLISH}): raise --past",

@@ -10,5 +10,9 @@ pub(super) fn view(matrix: &DMatrix<f64>) -> MatRef<'_, f64> {
 
 /// Copy back.
 pub(super) fn owned(matrix: MatRef<'_, f64>) -> DMatrix<f64> {
-    DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)])
+    let mut values = Vec::with_capacity(matrix.nrows() * matrix.ncols());
+    for j in 0..matrix.ncols() {
+        values.extend(matrix.col(j).iter().copied());
+    }
+    DMatrix::from_vec(matrix.nrows(), matrix.ncols(), values)
 }

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::covariance::ParameterLayout;
-use crate::linalg::{LinalgError, eigen, multiply_nt, multiply_tn, qr_thin, svd_thin};
+use crate::linalg::{LinalgError, eigen, multiply_nt, multiply_tn, qr_r, qr_thin, svd_thin};
 use crate::model::StateSpace;
 
 /// Singular values of the Jacobian below this share of the largest are not determined by the data.
@@ -24,11 +24,16 @@ pub struct Linearised {
 
 impl Linearised {
     fn new(jacobian: &DMatrix<f64>, residual: &[f64], rank: usize) -> Result<Self, LinalgError> {
-        let residual = DMatrix::from_column_slice(residual.len(), 1, residual);
-        let (q, r) = qr_thin(jacobian);
-        let svd = svd_thin(&r)?;
+        // The triangular factor with the residual as a last column holds Q' r as well: Q is never formed.
+        let parameters = jacobian.ncols();
+        let mut augmented = jacobian.clone().insert_column(parameters, 0.0);
+        augmented.column_mut(parameters).copy_from_slice(residual);
+        let r = qr_r(&augmented);
+        let rows = r.nrows().min(parameters);
+        let svd = svd_thin(&r.view((0, 0), (rows, parameters)).into_owned())?;
         let rank = rank.min(svd.values.len());
-        let projected = multiply_tn(&svd.u, &multiply_tn(&q, &residual));
+        let rotated = r.view((0, parameters), (rows, 1)).into_owned();
+        let projected = multiply_tn(&svd.u, &rotated);
         Ok(Self {
             directions: svd.v.columns(0, rank).into_owned(),
             values: svd.values.iter().take(rank).copied().collect(),

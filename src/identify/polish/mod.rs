@@ -60,10 +60,9 @@ pub enum Effort {
     Referee,
 }
 
-/// A cost this many times its degrees of freedom is beyond any acceptance...
+/// A cost this many times its degrees of freedom is beyond any acceptance: the referee stops once
+/// [`FLAT_STEPS`] steps in a row are too small to bring the cost below it with the steps that are left.
 const HOPELESS: f64 = 10.0;
-/// ...once [`FLAT_STEPS`] steps in a row gain less than this share of it.
-const HOPELESS_GAIN: f64 = 0.01;
 
 /// Result of the polish, in scaled units.
 #[derive(Debug, Clone)]
