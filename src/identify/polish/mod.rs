@@ -166,8 +166,9 @@ pub fn polish(
                 } else {
                     0
                 };
-                slow = if candidate_cost > hopeless && cost - candidate_cost < HOPELESS_GAIN * cost
-                {
+                // At this rate, would the steps that are left bring it within reach?
+                let left = (ITERATIONS - iterations) as f64 * (cost - candidate_cost);
+                slow = if candidate_cost - left > hopeless {
                     slow + 1
                 } else {
                     0
