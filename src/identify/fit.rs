@@ -8,7 +8,7 @@ use super::finish::{Chosen, finish};
 use super::horizon;
 use super::options::{Options, Order};
 use super::records::Records;
-use super::select::{Windowed, select};
+use super::select::{Windowed, propose, select};
 use super::summary::{PastEvidence, Summary};
 use super::truncation::past_for_truncation;
 use super::varx::varx;
@@ -63,7 +63,12 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
         None => choose_past(&data, records, options, &mut explanation)?,
     };
     let mut chosen = windowed(&data, records, past, options)?;
-    let mut selection = select(&chosen, options, sample_time)?;
+    // While the past window is too short the tests of the order have no meaning: they wait until it is chosen.
+    let mut selection = if options.past.is_none() {
+        propose(&chosen, options, sample_time)?
+    } else {
+        select(&chosen, options, sample_time)?
+    };
 
     if options.past.is_none() {
         // The past window must be long enough for the predictor of the model that it leads to.
@@ -90,12 +95,13 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
             // An estimate of the decay from a short window is not to be trusted far beyond it.
             .min(2 * past + 2);
             chosen = windowed(&data, records, wanted, options)?;
-            selection = select(&chosen, options, sample_time)?;
+            selection = propose(&chosen, options, sample_time)?;
             explanation.retain(|line| !line.starts_with("past window lengthened"));
             explanation.push(format!(
                 "past window lengthened to {wanted} so that what it cuts off no longer matters"
             ));
         }
+        selection = select(&chosen, options, sample_time)?;
     }
     finish(
         options,

@@ -43,6 +43,18 @@ pub struct Selection {
     pub noise_free: bool,
 }
 
+/// The model of the order that is asked for or that the singular values propose, without any test of it.
+///
+/// # Errors
+/// As [`select`].
+pub fn propose(
+    windowed: &Windowed,
+    options: &Options,
+    sample_time: f64,
+) -> Result<Selection, IdentifyError> {
+    select_by(windowed, options, sample_time, true)
+}
+
 /// Estimates the orders that come into question and chooses among them.
 ///
 /// # Errors
@@ -51,6 +63,15 @@ pub fn select(
     windowed: &Windowed,
     options: &Options,
     sample_time: f64,
+) -> Result<Selection, IdentifyError> {
+    select_by(windowed, options, sample_time, false)
+}
+
+fn select_by(
+    windowed: &Windowed,
+    options: &Options,
+    sample_time: f64,
+    proposal_only: bool,
 ) -> Result<Selection, IdentifyError> {
     let Windowed { factor, varx } = windowed;
     let (outputs, past) = (factor.outputs, factor.past);
@@ -94,6 +115,8 @@ pub fn select(
         candidates: Vec::new(),
     };
     let (order, explanation) = match &options.order {
+        Order::Auto if proposal_only => (order::proposal(&evidence).unwrap_or(1), String::new()),
+        Order::Compare(_) if proposal_only => (options.order.largest(), String::new()),
         Order::Fixed(n) => (*n, format!("order {n}: as asked")),
         Order::Compare(list) => {
             for n in list {
