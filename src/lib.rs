@@ -57,6 +57,7 @@
 
 pub mod cli;
 pub mod covariance;
+pub mod explain;
 pub mod identify;
 pub mod linalg;
 pub mod log;

@@ -13,12 +13,14 @@
 //! | `qr` | orthogonal factorisation and least squares |
 //! | `singular` | thin singular value decomposition, pseudo-inverse |
 //! | `eigen` | ordinary, symmetric and generalised eigenvalue problems |
+//! | `logarithm` | logarithm and exponential of small matrices |
 //! | `lyapunov` | discrete Lyapunov equation, stabilising observer gain |
 
 mod cholesky;
 mod eigen;
 mod error;
 mod exchange;
+mod logarithm;
 mod lyapunov;
 mod product;
 mod qr;
@@ -31,6 +33,7 @@ pub use eigen::{
     symmetric_eigen,
 };
 pub use error::LinalgError;
+pub use logarithm::{exponential, logarithm};
 pub use lyapunov::{discrete_lyapunov, stabilising_observer_gain};
 pub use product::{multiply, multiply_nt, multiply_tn};
 pub use qr::{least_squares, qr_r, qr_thin};

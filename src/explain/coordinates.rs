@@ -1,0 +1,226 @@
+//! Minimal coordinates of a linear plant: as many numbers as the input-output behaviour has.
+//!
+//! The states are the outputs and their scaled increments, `C`, `C (A - I)/s`, `C ((A - I)/s)^2`, ... (an
+//! observability form in the delta operator). `C` and all rows of `A` but the last of each output's chain are then
+//! fixed, and every plant near the given one has exactly one set of the numbers that are left: those rows of `A`,
+//! `B`, and the initial state. In contrast to poles and zeros they stay smooth where poles meet, and in contrast
+//! to the shift form they stay well scaled when the sampling is fast.
+
+use nalgebra::DMatrix;
+
+use super::plant::{Plant, row_major};
+use crate::linalg::svd_thin;
+
+/// Rows whose smallest singular value falls below this share of the largest are no basis.
+const INDEPENDENT: f64 = 1e-7;
+
+/// Where the free numbers of a plant sit.
+#[derive(Debug, Clone)]
+pub(crate) struct Coordinates {
+    /// The given plant in these coordinates.
+    pub given: Plant,
+    /// Rows of `A` that are free.
+    pub free_rows: Vec<usize>,
+    /// Inputs whose column of `B` is free: those that the given plant responds to.
+    pub active_inputs: Vec<usize>,
+    /// Chain length of each output: its rows follow one another.
+    pub chains: Vec<Vec<usize>>,
+    /// Takes the given state to these coordinates: `x_here = to_here * x_given`.
+    pub to_here: DMatrix<f64>,
+}
+
+impl Coordinates {
+    /// Coordinates around `plant`. Modes that no output sees are dropped.
+    pub fn new(plant: &Plant) -> Self {
+        let n = plant.states;
+        let scale = increment_scale(plant);
+        let delta = (plant.a_matrix() - DMatrix::identity(n, n)) / scale;
+        let c = plant.c_matrix();
+        let mut rows: Vec<DMatrix<f64>> = Vec::new();
+        let mut chains = vec![Vec::new(); plant.outputs];
+        let mut next: Vec<Option<DMatrix<f64>>> = (0..plant.outputs)
+            .map(|o| Some(c.rows(o, 1).into_owned()))
+            .collect();
+        // One row of each output in turn, until no row is new.
+        while rows.len() < n && next.iter().any(Option::is_some) {
+            for output in 0..plant.outputs {
+                let Some(row) = next[output].take() else {
+                    continue;
+                };
+                if rows.len() < n && is_new(&rows, &row) {
+                    chains[output].push(rows.len());
+                    next[output] = Some(&row * &delta);
+                    rows.push(row);
+                }
+            }
+        }
+        let seen = rows.len();
+        let mut t = DMatrix::zeros(seen, n);
+        for (i, row) in rows.iter().enumerate() {
+            t.set_row(i, &row.row(0));
+        }
+        let inverse = t
+            .clone()
+            .pseudo_inverse(1e-14)
+            .unwrap_or_else(|_| DMatrix::zeros(n, seen));
+        let mut given = plant.transformed(&t, &inverse);
+        given.states = seen;
+        tidy(&mut given, &chains, scale);
+        let free_rows = chains.iter().filter_map(|c| c.last().copied()).collect();
+        let active_inputs = (0..plant.inputs)
+            .filter(|&j| {
+                given.b_column(j).iter().any(|b| *b != 0.0)
+                    || (0..plant.outputs).any(|o| given.d[o * plant.inputs + j] != 0.0)
+            })
+            .collect();
+        Self {
+            given,
+            free_rows,
+            active_inputs,
+            chains,
+            to_here: t,
+        }
+    }
+
+    /// Numbers of `A` and `B` that are free.
+    pub fn len(&self) -> usize {
+        self.given.states * (self.free_rows.len() + self.active_inputs.len())
+    }
+
+    /// The free numbers of `plant`, which must be in these coordinates: rows of `A`, then columns of `B`.
+    pub fn numbers(&self, plant: &Plant) -> Vec<f64> {
+        let n = plant.states;
+        let mut numbers = Vec::with_capacity(self.len());
+        for &row in &self.free_rows {
+            numbers.extend_from_slice(&plant.a[row * n..(row + 1) * n]);
+        }
+        for &input in &self.active_inputs {
+            numbers.extend(plant.b_column(input));
+        }
+        numbers
+    }
+
+    /// The plant with these free numbers.
+    pub fn plant(&self, numbers: &[f64]) -> Plant {
+        let mut plant = self.given.clone();
+        let n = plant.states;
+        let (a_part, b_part) = numbers.split_at(n * self.free_rows.len());
+        for (&row, values) in self.free_rows.iter().zip(a_part.chunks_exact(n.max(1))) {
+            plant.a[row * n..(row + 1) * n].copy_from_slice(values);
+        }
+        for (&input, values) in self.active_inputs.iter().zip(b_part.chunks_exact(n.max(1))) {
+            for (i, value) in values.iter().enumerate() {
+                plant.b[i * plant.inputs + input] = *value;
+            }
+        }
+        plant
+    }
+}
+
+/// The size of one increment: so that a state and its scaled increment are of one size.
+fn increment_scale(plant: &Plant) -> f64 {
+    let n = plant.states;
+    if n == 0 {
+        return 1.0;
+    }
+    let norm = (plant.a_matrix() - DMatrix::identity(n, n))
+        .determinant()
+        .abs()
+        .powf(1.0 / n as f64);
+    if norm.is_finite() && norm > 1e-3 { norm.min(2.0) } else { 0.1 }
+}
+
+fn is_new(rows: &[DMatrix<f64>], row: &DMatrix<f64>) -> bool {
+    let n = row.ncols();
+    let mut stacked = DMatrix::zeros(rows.len() + 1, n);
+    for (i, r) in rows.iter().chain([row]).enumerate() {
+        let norm = r.norm();
+        if !(norm.is_finite() && norm > 0.0) {
+            return false;
+        }
+        stacked.set_row(i, &(r.row(0) / norm));
+    }
+    let Ok(svd) = svd_thin(&stacked) else {
+        return false;
+    };
+    let values: Vec<f64> = svd.values.iter().copied().collect();
+    let largest = values.iter().copied().fold(0.0, f64::max);
+    let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
+    smallest > INDEPENDENT * largest
+}
+
+/// Writes the entries that the coordinates fix exactly.
+fn tidy(plant: &mut Plant, chains: &[Vec<usize>], scale: f64) {
+    let n = plant.states;
+    for (output, chain) in chains.iter().enumerate() {
+        if let Some(&first) = chain.first() {
+            for i in 0..n {
+                plant.c[output * n + i] = if i == first { 1.0 } else { 0.0 };
+            }
+        }
+        for pair in chain.windows(2) {
+            for i in 0..n {
+                let value = if i == pair[0] {
+                    1.0
+                } else if i == pair[1] {
+                    scale
+                } else {
+                    0.0
+                };
+                plant.a[pair[0] * n + i] = value;
+            }
+        }
+    }
+}
+
+/// Rows that read a plant's outputs, their time derivatives and their integrals off the state.
+#[derive(Debug, Clone)]
+pub(crate) struct Derivatives {
+    /// `C A_c`, a row an output (`l x n`).
+    pub rate: Vec<Vec<f64>>,
+    /// `C B_c`, a row an output (`l x r`): what an input adds to the derivative directly.
+    pub rate_feedthrough: Vec<Vec<f64>>,
+    /// `C A_c^-1`, a row an output, where that exists.
+    pub integral: Option<Vec<Vec<f64>>>,
+    /// `-h^2 exp(A_c h/2) A_c B_c` (`n x r`, a column an input): what the first moment of an input within a sample
+    /// interval adds to the state, beyond its mean.
+    pub moment: Vec<Vec<f64>>,
+}
+
+impl Derivatives {
+    /// Of the continuous plant that `plant` is the zero-order-hold equivalent of; where there is none (a pole on the
+    /// negative real axis), of the increments.
+    pub fn new(plant: &Plant) -> Self {
+        let (n, r, l) = (plant.states, plant.inputs, plant.outputs);
+        let h = plant.sample_time;
+        let c = plant.c_matrix();
+        let mut both = DMatrix::identity(n + r, n + r);
+        both.view_mut((0, 0), (n, n)).copy_from(&plant.a_matrix());
+        both.view_mut((0, n), (n, r)).copy_from(&plant.b_matrix());
+        let log = crate::linalg::logarithm(&both).map_or_else(
+            || (&both - DMatrix::identity(n + r, n + r)) / h,
+            |log| log / h,
+        );
+        let a_c = log.view((0, 0), (n, n)).into_owned();
+        let b_c = log.view((0, n), (n, r)).into_owned();
+        let rows = |m: DMatrix<f64>| -> Vec<Vec<f64>> {
+            let flat = row_major(&m);
+            (0..l)
+                .map(|o| flat[o * m.ncols()..(o + 1) * m.ncols()].to_vec())
+                .collect()
+        };
+        let integral = a_c
+            .clone()
+            .try_inverse()
+            .filter(|inverse| inverse.iter().all(|v| v.is_finite()) && inverse.norm() * a_c.norm() < 1e9)
+            .map(|inverse| rows(&c * inverse));
+        let half = crate::linalg::exponential(&(&a_c * (0.5 * h)));
+        let moment = half * (&a_c * &b_c) * (-h * h);
+        Self {
+            moment: (0..r).map(|j| moment.column(j).iter().copied().collect()).collect(),
+            rate: rows(&c * &a_c),
+            rate_feedthrough: rows(&c * &b_c),
+            integral,
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! The recordings as the engine sees them: segments of one sampling, one set of channels.
+
+/// One contiguous recording.
+#[derive(Debug, Clone)]
+pub(crate) struct Segment {
+    /// `inputs[channel][sample]`.
+    pub inputs: Vec<Vec<f64>>,
+    /// `outputs[channel][sample]`.
+    pub outputs: Vec<Vec<f64>>,
+    /// Time of the first sample in seconds.
+    pub start_time: f64,
+}
+
+impl Segment {
+    pub fn samples(&self) -> usize {
+        self.inputs
+            .first()
+            .or_else(|| self.outputs.first())
+            .map_or(0, Vec::len)
+    }
+}
+
+/// All recordings that are explained together.
+#[derive(Debug, Clone)]
+pub(crate) struct Data {
+    pub segments: Vec<Segment>,
+    pub sample_time: f64,
+    pub inputs: usize,
+    pub outputs: usize,
+}
+
+/// A column a segment and output (`segment * outputs + output`): residuals, simulated outputs, weights.
+pub(crate) type Series = Vec<Vec<f64>>;
+
+impl Data {
+    /// Samples over all segments (a sample holds all channels).
+    pub fn samples(&self) -> usize {
+        self.segments.iter().map(Segment::samples).sum()
+    }
+
+    /// Measured outputs minus `simulated`.
+    pub fn residual(&self, simulated: &Series) -> Series {
+        self.outputs_as_series()
+            .zip(simulated)
+            .map(|(y, s)| y.iter().zip(s).map(|(y, s)| y - s).collect())
+            .collect()
+    }
+
+    /// The recorded outputs, series by series.
+    pub fn outputs_as_series(&self) -> impl Iterator<Item = &Vec<f64>> {
+        self.segments.iter().flat_map(|s| s.outputs.iter())
+    }
+
+    /// Standard deviation of each output over all segments.
+    pub fn output_scale(&self) -> Vec<f64> {
+        (0..self.outputs)
+            .map(|o| deviation(self.segments.iter().flat_map(|s| s.outputs[o].iter())))
+            .collect()
+    }
+
+    /// Standard deviation of each input over all segments.
+    pub fn input_scale(&self) -> Vec<f64> {
+        (0..self.inputs)
+            .map(|i| deviation(self.segments.iter().flat_map(|s| s.inputs[i].iter())))
+            .collect()
+    }
+}
+
+/// Standard deviation about the mean; 1 when there is no variation to divide by.
+fn deviation<'a>(values: impl Iterator<Item = &'a f64> + Clone) -> f64 {
+    let n = values.clone().count().max(1) as f64;
+    let mean = values.clone().sum::<f64>() / n;
+    let variance = values.map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+    if variance > 0.0 { variance.sqrt() } else { 1.0 }
+}

@@ -1,0 +1,387 @@
+//! What happens between the command that was recorded and the plant.
+
+use super::{Action, Clock, Definition, Mimic, Observed, Parameter, Unit, level};
+
+pub(super) static ENTRIES: &[Definition] = &[
+    Definition {
+        id: "input_saturation",
+        variant: "",
+        name: "saturation of the input",
+        equation: "u_eff = clamp(u, -limit, limit)",
+        parameters: &[Parameter::positive("limit", Unit::Input)],
+        mimics: &[Mimic {
+            effect: "sensor_saturation",
+            experiment: "a large slow input: a saturated actuator lowers the motion, a saturated sensor only what is shown of it",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Input(saturate),
+        starts: reached,
+    },
+    Definition {
+        id: "input_saturation",
+        variant: "upper",
+        name: "saturation of the input on the upper side",
+        equation: "u_eff = min(u, limit)",
+        parameters: &[Parameter::real("limit", Unit::Input)],
+        mimics: &[],
+        linear: &[],
+        persists: true,
+        action: Action::Input(saturate_upper),
+        starts: reached_upper,
+    },
+    Definition {
+        id: "input_saturation",
+        variant: "lower",
+        name: "saturation of the input on the lower side",
+        equation: "u_eff = max(u, limit)",
+        parameters: &[Parameter::real("limit", Unit::Input)],
+        mimics: &[],
+        linear: &[],
+        persists: true,
+        action: Action::Input(saturate_lower),
+        starts: reached_lower,
+    },
+    Definition {
+        id: "input_dead_zone",
+        variant: "",
+        name: "dead zone of the input",
+        equation: "u_eff = u - clamp(u, -width, width)",
+        parameters: &[Parameter::positive("width", Unit::Input)],
+        mimics: &[Mimic {
+            effect: "coulomb_friction",
+            experiment: "a constant input plus a small sine: friction still acts, a dead zone does not",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Input(dead_zone),
+        starts: widths,
+    },
+    Definition {
+        id: "input_backlash",
+        variant: "",
+        name: "backlash (play) at the input",
+        equation: "u_eff follows u when u has moved by the gap",
+        parameters: &[Parameter::positive("half_gap", Unit::Input)],
+        mimics: &[
+            Mimic {
+                effect: "hysteresis",
+                experiment: "a slow triangle at several amplitudes: play keeps its width, hysteresis does not",
+            },
+            Mimic {
+                effect: "coulomb_friction",
+                experiment: "reversals of the input while the plant moves on: play follows the command, friction the motion",
+            },
+        ],
+        linear: &[],
+        persists: true,
+        action: Action::Input(play),
+        starts: widths,
+    },
+    Definition {
+        id: "input_rate_limit",
+        variant: "",
+        name: "rate limit of the actuator",
+        equation: "|du_eff/dt| <= rate",
+        parameters: &[Parameter::positive("rate", Unit::InputRate)],
+        mimics: &[Mimic {
+            effect: "actuator_lag",
+            experiment: "steps of two sizes: a rate limit takes twice the time for twice the step, a lag the same time",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Input(rate_limit),
+        starts: rates,
+    },
+    Definition {
+        id: "input_asymmetry",
+        variant: "",
+        name: "input gain that differs with the sign",
+        equation: "u_eff = (1 + a) u for u > 0, (1 - a) u else",
+        parameters: &[Parameter::between("asymmetry", Unit::Ratio, -1.0, 1.0)],
+        mimics: &[Mimic {
+            effect: "quadratic_stiffness",
+            experiment: "steps up and down from several levels: an asymmetric actuator scales with the sign of the command alone",
+        }],
+        linear: &[0],
+        persists: true,
+        action: Action::Input(asymmetry),
+        starts: |_| vec![vec![0.05]],
+    },
+    Definition {
+        id: "input_delay",
+        variant: "",
+        name: "delay of the input",
+        equation: "u_eff(t) = u(t - delay)",
+        parameters: &[Parameter {
+            name: "delay",
+            unit: Unit::Second,
+            logarithmic: false,
+            lower: 0.0,
+            upper: 1e12,
+        }],
+        mimics: &[Mimic {
+            effect: "actuator_lag",
+            experiment: "faster sampling and a step: after a delay nothing moves at first, after a lag it moves at once",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Input(delay),
+        starts: |seen| [0.3, 1.0, 2.0, 4.0].map(|samples| vec![samples * seen.step]).to_vec(),
+    },
+    Definition {
+        id: "actuator_lag",
+        variant: "",
+        name: "lag of the actuator",
+        equation: "tau du_eff/dt + u_eff = u",
+        parameters: &[Parameter::positive("time_constant", Unit::Second)],
+        mimics: &[Mimic {
+            effect: "input_delay",
+            experiment: "faster sampling and a step: after a delay nothing moves at first, after a lag it moves at once",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Input(lag),
+        starts: |seen| [0.3, 1.0, 3.0, 10.0].map(|samples| vec![samples * seen.step]).to_vec(),
+    },
+    Definition {
+        id: "input_saturation",
+        variant: "soft",
+        name: "saturation of the input with a soft knee",
+        equation: "u_eff = u/(1 + |u/limit|^s)^(1/s)",
+        parameters: &[Parameter::positive("limit", Unit::Input), SHARPNESS],
+        mimics: &[],
+        linear: &[],
+        persists: true,
+        action: Action::Input(saturate_softly),
+        starts: |_| Vec::new(),
+    },
+    Definition {
+        id: "input_rate_limit",
+        variant: "held",
+        name: "rate limit of the command, held between samples",
+        equation: "|u_eff[k] - u_eff[k-1]| <= rate h",
+        parameters: &[Parameter::positive("rate", Unit::InputRate)],
+        mimics: &[],
+        linear: &[],
+        persists: true,
+        action: Action::Input(rate_limit_held),
+        starts: |_| Vec::new(),
+    },
+    Definition {
+        id: "input_delay",
+        variant: "interpolated",
+        name: "delay of the command, interpolated and held between samples",
+        equation: "u_eff[k] = (1 - f) u[k-d] + f u[k-d-1]",
+        parameters: &[Parameter {
+            name: "delay",
+            unit: Unit::Second,
+            logarithmic: false,
+            lower: 0.0,
+            upper: 1e12,
+        }],
+        mimics: &[],
+        linear: &[],
+        persists: true,
+        action: Action::Input(delay_held),
+        starts: |_| Vec::new(),
+    },
+    Definition {
+        id: "actuator_lag",
+        variant: "held",
+        name: "lag of the command, held between samples",
+        equation: "u_eff[k+1] = u_eff[k] + (1 - exp(-h/tau)) (u[k+1] - u_eff[k])",
+        parameters: &[Parameter::positive("time_constant", Unit::Second)],
+        mimics: &[],
+        linear: &[],
+        persists: true,
+        action: Action::Input(lag_held),
+        starts: |_| Vec::new(),
+    },
+];
+
+/// Sharpness of a knee: infinite is a corner (Rapp's model of amplifier saturation).
+pub(super) const SHARPNESS: Parameter = Parameter {
+    lower: 1.0,
+    upper: 100.0,
+    ..Parameter::positive("knee_sharpness", Unit::Ratio)
+};
+
+fn saturate_softly(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+    for u in u {
+        *u = soft(*u, p[0], p[1]);
+    }
+}
+
+/// `x/(1 + |x/limit|^sharpness)^(1/sharpness)`.
+pub(super) fn soft(x: f64, limit: f64, sharpness: f64) -> f64 {
+    let ratio = (x / limit).abs();
+    if ratio > 1.0 {
+        // Written with the inverse ratio, so that no power overflows.
+        x.signum() * limit / (1.0 + ratio.powf(-sharpness)).powf(1.0 / sharpness)
+    } else {
+        x / (1.0 + ratio.powf(sharpness)).powf(1.0 / sharpness)
+    }
+}
+
+fn rate_limit_held(p: &[f64], u: &mut [f64], _: &mut [f64], clock: &Clock) {
+    let most = p[0] * clock.step;
+    let mut at = 0.0;
+    for u in u {
+        at += (*u - at).clamp(-most, most);
+        *u = at;
+    }
+}
+
+fn delay_held(p: &[f64], u: &mut [f64], _: &mut [f64], clock: &Clock) {
+    let mut unused = vec![0.0; u.len()];
+    delay(p, u, &mut unused, clock);
+}
+
+fn lag_held(p: &[f64], u: &mut [f64], _: &mut [f64], clock: &Clock) {
+    let share = -(-clock.step / p[0]).exp_m1();
+    let mut at = u.first().copied().unwrap_or(0.0);
+    for u in u {
+        at += share * (*u - at);
+        *u = at;
+    }
+}
+
+fn saturate(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+    for u in u {
+        *u = u.clamp(-p[0], p[0]);
+    }
+}
+
+fn saturate_upper(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+    for u in u {
+        *u = u.min(p[0]);
+    }
+}
+
+fn saturate_lower(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+    for u in u {
+        *u = u.max(p[0]);
+    }
+}
+
+fn dead_zone(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+    for u in u {
+        *u -= u.clamp(-p[0], p[0]);
+    }
+}
+
+fn play(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+    // At rest in the middle of the gap when the recording begins.
+    let mut held = 0.0;
+    if let Some(first) = u.first() {
+        held = *first - first.clamp(-p[0], p[0]);
+    }
+    for u in u {
+        held = f64::clamp(held, *u - p[0], *u + p[0]);
+        *u = held;
+    }
+}
+
+/// A ramp over the share `ramp` of the interval, then constant.
+fn rate_limit(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+    let most = p[0] * clock.step;
+    let mut at = u.first().copied().unwrap_or(0.0);
+    for (u, moment) in u.iter_mut().zip(moment) {
+        let wanted = *u - at;
+        let moved = wanted.clamp(-most, most);
+        let ramp = (moved.abs() / most).min(1.0);
+        *u = at + moved * (1.0 - 0.5 * ramp);
+        *moment += moved * ramp * (0.25 - ramp / 6.0);
+        at += moved;
+    }
+}
+
+fn asymmetry(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+    for u in u {
+        *u += p[0] * u.abs();
+    }
+}
+
+/// Between two samples the held command changes at the share of the interval that is delayed.
+fn delay(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+    let samples = (p[0] / clock.step).clamp(0.0, u.len() as f64);
+    let whole = samples.floor() as usize;
+    let share = samples - samples.floor();
+    let before = u.to_vec();
+    let at = |k: usize, back: usize| before[k.saturating_sub(back)];
+    for (k, (u, moment)) in u.iter_mut().zip(moment).enumerate() {
+        let (new, old) = (at(k, whole), at(k, whole + 1));
+        *u = new + share * (old - new);
+        *moment += 0.5 * (new - old) * share * (1.0 - share);
+    }
+}
+
+/// An exponential within each interval.
+fn lag(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+    let a = clock.step / p[0];
+    let decay = (-a).exp();
+    let mean_of_decay = -(-a).exp_m1() / a;
+    let moment_of_decay = if a < 1e-3 {
+        -a / 12.0
+    } else {
+        (1.0 - (1.0 + a) * decay) / (a * a) - 0.5 * mean_of_decay
+    };
+    let mut at = u.first().copied().unwrap_or(0.0);
+    for (u, moment) in u.iter_mut().zip(moment) {
+        let gap = at - *u;
+        at = *u + gap * decay;
+        *u += gap * mean_of_decay;
+        *moment += gap * moment_of_decay;
+    }
+}
+
+fn reached(seen: &Observed) -> Vec<Vec<f64>> {
+    [0.4, 0.6, 0.75, 0.85, 0.93, 0.97, 0.99]
+        .map(|q| vec![below_the_top(&seen.channel, q).max(1e-12)])
+        .to_vec()
+}
+
+/// A level that some of the samples exceed: the quantile, or, where the top is a plateau, a share of it.
+fn below_the_top(values: &[f64], q: f64) -> f64 {
+    let top = level(values, 1.0, f64::abs);
+    level(values, q, f64::abs).min((0.4 + 0.58 * q) * top)
+}
+
+fn reached_upper(seen: &Observed) -> Vec<Vec<f64>> {
+    [0.6, 0.85, 0.95]
+        .map(|q| vec![level(&seen.channel, q, |v| v)])
+        .to_vec()
+}
+
+fn reached_lower(seen: &Observed) -> Vec<Vec<f64>> {
+    [0.4, 0.15, 0.05]
+        .map(|q| vec![level(&seen.channel, q, |v| v)])
+        .to_vec()
+}
+
+fn widths(seen: &Observed) -> Vec<Vec<f64>> {
+    let size = level(&seen.channel, 0.7, f64::abs).max(1e-12);
+    [0.02, 0.06, 0.15, 0.3, 0.6]
+        .map(|share| vec![share * size])
+        .to_vec()
+}
+
+fn rates(seen: &Observed) -> Vec<Vec<f64>> {
+    let changes: Vec<f64> = seen
+        .channel
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).abs() / seen.step)
+        .filter(|rate| *rate > 0.0)
+        .collect();
+    if changes.is_empty() {
+        return Vec::new();
+    }
+    let top = level(&changes, 1.0, f64::abs);
+    let mut starts: Vec<Vec<f64>> = [0.3, 0.6, 0.85, 0.95]
+        .map(|q| vec![level(&changes, q, f64::abs)])
+        .to_vec();
+    // Commands that jump leave no levels between: shares of the largest jump, which then takes several samples.
+    starts.extend([0.7, 0.4, 0.2, 0.1].map(|share| vec![share * top]));
+    starts
+}

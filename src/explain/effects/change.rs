@@ -1,0 +1,49 @@
+//! Parameters that change at some time.
+
+use super::{Action, Clock, Definition, Mimic, Motion, Needs, Parameter, Sense, Unit};
+
+pub(super) static ENTRIES: &[Definition] = &[
+    Definition {
+        id: "gain_change",
+        variant: "",
+        name: "gain that changes at some time",
+        equation: "u_eff = (1 + g) u for t >= t0",
+        parameters: &[
+            Parameter::between("change", Unit::Ratio, -3.0, 3.0),
+            Parameter::real("from", Unit::Second),
+        ],
+        mimics: &[Mimic {
+            effect: "stiffness_change",
+            experiment: "a sweep before and after: a stiffness moves the resonance, a gain does not",
+        }],
+        linear: &[0],
+        persists: true,
+        action: Action::Input(gain),
+        starts: |seen| seen.change_times.iter().map(|t| vec![0.02, *t]).collect(),
+    },
+    Definition {
+        id: "stiffness_change",
+        variant: "",
+        name: "stiffness that changes at some time",
+        equation: "F = -dk x for t >= t0",
+        parameters: &[Parameter::real("from", Unit::Second)],
+        mimics: &[Mimic {
+            effect: "gain_change",
+            experiment: "a sweep before and after: a stiffness moves the resonance, a gain does not",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Force(stiffness, Needs::Position, Sense::Either),
+        starts: |seen| seen.change_times.iter().map(|t| vec![*t]).collect(),
+    },
+];
+
+fn gain(p: &[f64], u: &mut [f64], _: &mut [f64], clock: &Clock) {
+    for (k, u) in u.iter_mut().enumerate() {
+        *u *= 1.0 + p[0] * clock.share_after(k, p[1]);
+    }
+}
+
+fn stiffness(p: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+    -motion.middle() * motion.clock.share_after(motion.sample, p[0])
+}

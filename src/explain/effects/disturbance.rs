@@ -1,0 +1,94 @@
+//! What acts on the plant and was not commanded, and paths that the simulation lacks.
+
+use super::{Action, Clock, Definition, Mimic, Motion, Needs, Parameter, Sense, Unit};
+
+pub(super) static ENTRIES: &[Definition] = &[
+    Definition {
+        id: "periodic_disturbance",
+        variant: "",
+        name: "periodic disturbance",
+        equation: "y = y_true + c cos(2 pi f t) + s sin(2 pi f t)",
+        parameters: &[
+            Parameter::positive("frequency", Unit::Hertz),
+            Parameter::real("cosine", Unit::Position),
+            Parameter::real("sine", Unit::Position),
+        ],
+        mimics: &[Mimic {
+            effect: "extra_mode",
+            experiment: "record without any input: a disturbance is still there, a resonance is not",
+        }],
+        linear: &[1, 2],
+        persists: false,
+        action: Action::Sensor(sine),
+        starts: |seen| seen.lines.iter().map(|f| vec![*f, 0.0, 0.0]).collect(),
+    },
+    Definition {
+        id: "load_step",
+        variant: "",
+        name: "constant load from some time on",
+        equation: "F = F0 for t >= t0",
+        parameters: &[Parameter::real("from", Unit::Second)],
+        mimics: &[
+            Mimic {
+                effect: "sensor_offset",
+                experiment: "read the sensor at rest, unloaded, before and after",
+            },
+            Mimic {
+                effect: "sensor_drift",
+                experiment: "a long recording at a constant input: a drift goes on, a load step is over",
+            },
+        ],
+        linear: &[],
+        persists: true,
+        action: Action::Force(step, Needs::Time, Sense::Either),
+        starts: |seen| seen.change_times.iter().map(|t| vec![*t]).collect(),
+    },
+    Definition {
+        id: "extra_mode",
+        variant: "",
+        name: "resonance that the simulation lacks",
+        equation: "y = y_true + H u, H of order 2",
+        parameters: &[
+            Parameter::positive("frequency", Unit::Hertz),
+            Parameter::positive("damping", Unit::Ratio),
+        ],
+        mimics: &[
+            Mimic {
+                effect: "input_delay",
+                experiment: "a sweep over the resonance: only a resonance has a peak",
+            },
+            Mimic {
+                effect: "periodic_disturbance",
+                experiment: "record without any input: a disturbance is still there, a resonance is not",
+            },
+        ],
+        linear: &[],
+        persists: true,
+        action: Action::Mode,
+        starts: |seen| seen.frequencies.iter().map(|f| vec![*f, 0.05]).collect(),
+    },
+    Definition {
+        id: "missing_input",
+        variant: "",
+        name: "input that acts in reality and not in the simulation",
+        equation: "x+ = A x + B u + b u_missing",
+        parameters: &[],
+        mimics: &[],
+        linear: &[],
+        persists: true,
+        action: Action::MissingPath,
+        starts: |_| vec![vec![]],
+    },
+];
+
+fn sine(p: &[f64], y: &mut [f64], clock: &Clock) {
+    let turn = std::f64::consts::TAU * p[0];
+    for (k, y) in y.iter_mut().enumerate() {
+        let (s, c) = (turn * clock.time(k)).sin_cos();
+        *y += p[1] * c + p[2] * s;
+    }
+}
+
+fn step(p: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+    motion.clock.share_after(motion.sample, p[0])
+}

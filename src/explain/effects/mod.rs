@@ -1,0 +1,227 @@
+//! The library of physical effects that a simulation may have left out: one file a family.
+//!
+//! An entry is a [`Definition`]: an equation, where it acts (its [`Port`]), its parameters with units and bounds,
+//! where to start looking for them, what imitates it, and which recording would tell the two apart. A force law is
+//! written for unit amplitude: amplitude and entry point are the direction `b_w` of [`super::candidate`].
+
+mod actuator;
+mod change;
+mod disturbance;
+mod friction;
+mod law;
+mod process;
+mod sensor;
+mod stiffness;
+
+pub(crate) use law::{Clock, Motion, Observed, level};
+
+/// Where an effect acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Port {
+    /// On an input channel, before the plant.
+    Input,
+    /// A force inside the plant: a function of a position or a velocity, through a direction of its own.
+    Force,
+    /// On a measured output, after the plant.
+    Sensor,
+    /// Another dynamic path from the inputs to an output, beside the plant.
+    Path,
+    /// Changes what the recording is, sample by sample; found by exact tests, not by fits.
+    Exact,
+}
+
+/// What a parameter is measured in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// The unit of the input channel.
+    Input,
+    /// The unit of the input channel per second.
+    InputRate,
+    /// The unit of the output (or position) that the effect looks at.
+    Position,
+    /// That unit per second.
+    Rate,
+    /// Seconds.
+    Second,
+    /// Hertz.
+    Hertz,
+    /// A pure number.
+    Ratio,
+    /// Radians.
+    Radian,
+}
+
+/// One number of an effect.
+#[derive(Debug, Clone, Copy)]
+pub struct Parameter {
+    /// Name in documents, spelled out.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: Unit,
+    /// Fitted on a logarithmic scale: positive.
+    pub logarithmic: bool,
+    /// Smallest value allowed.
+    pub lower: f64,
+    /// Largest value allowed.
+    pub upper: f64,
+}
+
+impl Parameter {
+    /// A positive number, fitted on a logarithmic scale.
+    pub(crate) const fn positive(name: &'static str, unit: Unit) -> Self {
+        Self {
+            name,
+            unit,
+            logarithmic: true,
+            lower: 1e-12,
+            upper: 1e12,
+        }
+    }
+
+    /// Any number.
+    pub(crate) const fn real(name: &'static str, unit: Unit) -> Self {
+        Self {
+            name,
+            unit,
+            logarithmic: false,
+            lower: -1e12,
+            upper: 1e12,
+        }
+    }
+
+    /// A number between bounds.
+    pub(crate) const fn between(name: &'static str, unit: Unit, lower: f64, upper: f64) -> Self {
+        Self {
+            name,
+            unit,
+            logarithmic: false,
+            lower,
+            upper,
+        }
+    }
+}
+
+/// What sign the amplitude of a force may have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sense {
+    /// It only resists: friction dissipates, a stop pushes back.
+    Resists,
+    /// Either way.
+    Either,
+}
+
+/// Which of the two signals of a place a force needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Needs {
+    /// A position.
+    Position,
+    /// A velocity.
+    Rate,
+    /// Nothing: time alone.
+    Time,
+}
+
+/// A parameter vector's effect on one output channel, in place.
+pub(crate) type ChannelLaw = fn(parameters: &[f64], channel: &mut [f64], clock: &Clock);
+/// The same for an input: the mean over each sample interval, and its first moment about the middle in units of the
+/// interval, `int (s - h/2) u(s) ds / h^2`, for laws that do not hold their value over the interval.
+pub(crate) type InputLaw = fn(parameters: &[f64], mean: &mut [f64], moment: &mut [f64], clock: &Clock);
+/// Force of unit amplitude over one sample; the memory is the effect's own state.
+pub(crate) type ForceLaw = fn(parameters: &[f64], motion: &Motion, memory: &mut [f64; 2]) -> f64;
+/// Starting values of the shape parameters, from what the simulation says the channel does.
+pub(crate) type Starts = fn(&Observed) -> Vec<Vec<f64>>;
+
+/// What the effect does.
+#[derive(Clone, Copy)]
+pub(crate) enum Action {
+    /// Changes an input channel.
+    Input(InputLaw),
+    /// A force through a direction.
+    Force(ForceLaw, Needs, Sense),
+    /// Changes an output channel.
+    Sensor(ChannelLaw),
+    /// A second-order path beside the plant (`extra_mode`).
+    Mode,
+    /// The path of an input that the simulation lacks (`missing_input`).
+    MissingPath,
+    /// Found by an exact test; in the model it is a sensor law without effect on fits.
+    Exact,
+}
+
+impl std::fmt::Debug for Action {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Input(_) => "Input",
+            Self::Force(..) => "Force",
+            Self::Sensor(_) => "Sensor",
+            Self::Mode => "Mode",
+            Self::MissingPath => "MissingPath",
+            Self::Exact => "Exact",
+        })
+    }
+}
+
+/// What imitates an effect, and what would tell them apart.
+#[derive(Debug, Clone, Copy)]
+pub struct Mimic {
+    /// Id of the other effect.
+    pub effect: &'static str,
+    /// The recording that separates the two.
+    pub experiment: &'static str,
+}
+
+/// An entry of the library.
+#[derive(Debug)]
+pub struct Definition {
+    /// Id in documents: `coulomb_friction`.
+    pub id: &'static str,
+    /// Which form of it, where there are several (`upper`, `lower`); empty else.
+    pub variant: &'static str,
+    /// What people call it.
+    pub name: &'static str,
+    /// The law, for reading.
+    pub equation: &'static str,
+    /// Shape parameters (a force's amplitude is not among them).
+    pub parameters: &'static [Parameter],
+    /// What it looks like, and what tells the two apart.
+    pub mimics: &'static [Mimic],
+    /// Parameters that scale what the effect does: with all of them zero it does nothing.
+    pub linear: &'static [usize],
+    /// Whether it acts on a new input as well: an event of the recording (a drift, a frozen sensor) does not.
+    pub persists: bool,
+    pub(crate) action: Action,
+    pub(crate) starts: Starts,
+}
+
+impl Definition {
+    /// Where the effect acts.
+    pub fn port(&self) -> Port {
+        match self.action {
+            Action::Input(_) => Port::Input,
+            Action::Force(..) => Port::Force,
+            Action::Sensor(_) => Port::Sensor,
+            Action::Mode | Action::MissingPath => Port::Path,
+            Action::Exact => Port::Exact,
+        }
+    }
+}
+
+/// All entries, variants of one effect next to each other.
+pub fn library() -> impl Iterator<Item = &'static Definition> {
+    [
+        friction::ENTRIES,
+        stiffness::ENTRIES,
+        actuator::ENTRIES,
+        sensor::ENTRIES,
+        disturbance::ENTRIES,
+        change::ENTRIES,
+        process::ENTRIES,
+    ]
+    .into_iter()
+    .flatten()
+}
+
+/// The first entry with this id and variant.
+pub fn find(id: &str, variant: &str) -> Option<&'static Definition> {
+    library().find(|d| d.id == id && d.variant == variant)
+}

@@ -1,0 +1,353 @@
+//! Levenberg and Marquardt on the whitened simulation error.
+//!
+//! Derivatives are forward differences whose steps adapt until they move the simulation by a fixed share of its size:
+//! parameters differ by ten decades in scale, and most laws are not smooth everywhere. Tails are met by iterated
+//! weights (Student's t), the noise model is estimated anew between rounds.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::data::{Data, Series};
+use super::noise::{MOST_ORDER, Mask, Noise};
+use super::structure::Structure;
+use crate::linalg::multiply_tn;
+
+/// A difference step should move the outputs by this share of their standard deviation.
+const STEP_SHARE: f64 = 1e-5;
+/// The deviance has settled when an accepted step lowers it by less.
+const SETTLED: f64 = 0.02;
+
+/// How hard a fit tries.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Effort {
+    /// Rounds of noise estimation.
+    pub rounds: usize,
+    /// Steps a round.
+    pub steps: usize,
+}
+
+impl Effort {
+    /// To rank candidates.
+    pub const RANK: Self = Self { rounds: 2, steps: 12 };
+    /// To report.
+    pub const FINAL: Self = Self { rounds: 3, steps: 40 };
+}
+
+/// What fits share: the data, which samples count, how the outputs are scaled.
+#[derive(Debug, Clone)]
+pub(crate) struct Problem<'a> {
+    pub data: &'a Data,
+    pub mask: Mask,
+    pub scale: Vec<f64>,
+    /// Largest order of the noise model.
+    pub noise_order: usize,
+}
+
+impl<'a> Problem<'a> {
+    /// All samples count but the first few, from which a whitening filter starts.
+    pub fn new(data: &'a Data) -> Self {
+        let mask = data
+            .outputs_as_series()
+            .map(|y| (0..y.len()).map(|k| k >= MOST_ORDER).collect())
+            .collect();
+        Self {
+            data,
+            mask,
+            scale: data.output_scale(),
+            noise_order: MOST_ORDER,
+        }
+    }
+
+    /// Values that count.
+    pub fn count(&self) -> usize {
+        self.mask.iter().flatten().filter(|keep| **keep).count()
+    }
+
+    /// Root mean square of a simulated change, in standard deviations of the outputs.
+    fn size(&self, a: &Series, b: &Series) -> f64 {
+        let (mut sum, mut n) = (0.0, 0usize);
+        for (s, (a, b)) in a.iter().zip(b).enumerate() {
+            let scale = self.scale[s % self.scale.len()];
+            for (a, b) in a.iter().zip(b) {
+                sum += ((a - b) / scale).powi(2);
+            }
+            n += a.len();
+        }
+        (sum / n.max(1) as f64).sqrt()
+    }
+
+    /// Noise model of a residual.
+    pub fn noise(&self, residual: &Series) -> Noise {
+        Noise::estimate(residual, self.data.outputs, &self.mask, self.noise_order)
+    }
+}
+
+/// A structure with its best numbers.
+#[derive(Debug, Clone)]
+pub(crate) struct Fit {
+    pub structure: Structure,
+    pub theta: Vec<f64>,
+    pub noise: Noise,
+    /// `-2 log` likelihood under its own noise model.
+    pub deviance: f64,
+    /// Free numbers of the structure and its noise model.
+    pub free: usize,
+    pub simulated: Series,
+    pub residual: Series,
+    pub steps: Vec<f64>,
+}
+
+impl Fit {
+    /// Schwarz's criterion: smaller is better.
+    pub fn criterion(&self, count: usize) -> f64 {
+        self.deviance + (self.free as f64) * (count.max(2) as f64).ln()
+    }
+
+    /// Simulates the structure at `theta` and takes its noise model, without any fitting.
+    pub fn at(problem: &Problem, structure: Structure, theta: Vec<f64>) -> Option<Self> {
+        let simulated = structure.simulate(&theta, problem.data)?;
+        let residual = problem.data.residual(&simulated);
+        let noise = problem.noise(&residual);
+        let deviance = noise.deviance(&residual, &problem.mask);
+        let free = structure.len() + noise.len();
+        let steps = first_steps(&structure, &theta);
+        Some(Self {
+            structure,
+            theta,
+            noise,
+            deviance,
+            free,
+            simulated,
+            residual,
+            steps,
+        })
+    }
+
+    /// Fits all free numbers from `theta` on. `start` is the noise model of the first round; without it that of the
+    /// residual at the start, white.
+    pub fn run(
+        problem: &Problem,
+        structure: Structure,
+        theta: Vec<f64>,
+        start: Option<&Noise>,
+        effort: Effort,
+    ) -> Option<Self> {
+        let mut fit = Self::at(problem, structure, theta)?;
+        if fit.theta.is_empty() {
+            return Some(fit);
+        }
+        let mut best: Option<Self> = None;
+        for round in 0..effort.rounds {
+            let noise = match (round, start) {
+                (0, Some(start)) => start.clone(),
+                (0, None) => Noise::white(&fit.residual, problem.data.outputs, &problem.mask),
+                _ => fit.noise.clone(),
+            };
+            fit.descend(problem, &noise, effort.steps);
+            fit.noise = problem.noise(&fit.residual);
+            fit.deviance = fit.noise.deviance(&fit.residual, &problem.mask);
+            fit.free = fit.structure.len() + fit.noise.len();
+            let settled = best
+                .as_ref()
+                .is_some_and(|b| (b.deviance - fit.deviance).abs() < 0.2);
+            if best.as_ref().is_none_or(|b| fit.deviance < b.deviance) {
+                best = Some(fit.clone());
+            }
+            if settled {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Steps at a fixed noise model while they help.
+    fn descend(&mut self, problem: &Problem, noise: &Noise, most: usize) {
+        let bounds = self.structure.bounds();
+        let mut damping = 1e-3;
+        let mut cost = noise.deviance(&self.residual, &problem.mask);
+        for _ in 0..most {
+            let Some(system) = self.normal_equations(problem, noise) else {
+                return;
+            };
+            let mut accepted = false;
+            for _ in 0..8 {
+                let Some(step) = system.step(damping) else {
+                    damping *= 10.0;
+                    continue;
+                };
+                let trial: Vec<f64> = self
+                    .theta
+                    .iter()
+                    .zip(step.iter())
+                    .zip(&bounds)
+                    .map(|((t, s), (lo, hi))| (t + s).clamp(*lo, *hi))
+                    .collect();
+                if let Some(simulated) = self.structure.simulate(&trial, problem.data) {
+                    let residual = problem.data.residual(&simulated);
+                    let now = noise.deviance(&residual, &problem.mask);
+                    if now < cost {
+                        let gained = cost - now;
+                        self.theta = trial;
+                        self.simulated = simulated;
+                        self.residual = residual;
+                        cost = now;
+                        damping = (damping * 0.2).max(1e-9);
+                        if gained < SETTLED {
+                            return;
+                        }
+                        accepted = true;
+                        break;
+                    }
+                }
+                damping *= 8.0;
+                if damping > 1e8 {
+                    return;
+                }
+            }
+            if !accepted {
+                return;
+            }
+        }
+    }
+
+    /// Change of the simulation with each number: a series a number, and none for one that moves nothing.
+    pub fn sensitivities(&mut self, problem: &Problem) -> Vec<Option<Series>> {
+        let bounds = self.structure.bounds();
+        let mut columns = Vec::with_capacity(self.theta.len());
+        for i in 0..self.theta.len() {
+            let mut column = None;
+            for _ in 0..4 {
+                let mut moved = self.theta.clone();
+                // Forward, or backward from an upper bound.
+                let step = if moved[i] + self.steps[i] > bounds[i].1 {
+                    -self.steps[i]
+                } else {
+                    self.steps[i]
+                };
+                moved[i] += step;
+                let Some(simulated) = self.structure.simulate(&moved, problem.data) else {
+                    self.steps[i] *= 1e-2;
+                    continue;
+                };
+                let size = problem.size(&simulated, &self.simulated);
+                if size == 0.0 {
+                    self.steps[i] *= 1e3;
+                    continue;
+                }
+                let far = size > 30.0 * STEP_SHARE || size < STEP_SHARE / 30.0;
+                self.steps[i] *= (STEP_SHARE / size).clamp(1e-4, 1e4);
+                if far {
+                    continue;
+                }
+                column = Some(
+                    simulated
+                        .iter()
+                        .zip(&self.simulated)
+                        .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b) / step).collect())
+                        .collect(),
+                );
+                break;
+            }
+            columns.push(column);
+        }
+        columns
+    }
+
+    fn normal_equations(&mut self, problem: &Problem, noise: &Noise) -> Option<NormalEquations> {
+        let columns = self.sensitivities(problem);
+        let rows: usize = problem.count();
+        let whitened = noise.whiten(&self.residual);
+        let mut weights = Vec::with_capacity(rows);
+        let mut e = Vec::with_capacity(rows);
+        for (column, mask) in whitened.iter().zip(&problem.mask) {
+            for (v, keep) in column.iter().zip(mask) {
+                if *keep {
+                    let w = noise.weight(*v).sqrt();
+                    weights.push(w);
+                    e.push(w * v);
+                }
+            }
+        }
+        let used: Vec<usize> = (0..columns.len()).filter(|i| columns[*i].is_some()).collect();
+        if used.is_empty() {
+            return None;
+        }
+        let mut flat = Vec::with_capacity(rows * (used.len() + 1));
+        for column in columns.iter().flatten() {
+            let from = flat.len();
+            for (series, mask) in noise.whiten(column).iter().zip(&problem.mask) {
+                flat.extend(series.iter().zip(mask).filter_map(|(v, keep)| keep.then_some(*v)));
+            }
+            for (v, w) in flat[from..].iter_mut().zip(&weights) {
+                *v *= w;
+            }
+        }
+        flat.extend_from_slice(&e);
+        let m = used.len();
+        let all = DMatrix::from_vec(rows, m + 1, flat);
+        let gram = multiply_tn(&all, &all);
+        gram.iter().all(|v| v.is_finite()).then(|| NormalEquations {
+            hessian: gram.view((0, 0), (m, m)).into_owned(),
+            gradient: gram.view((0, m), (m, 1)).column(0).into_owned(),
+            used,
+            total: self.theta.len(),
+        })
+    }
+
+    /// Covariance of the numbers (those that move nothing have none).
+    pub fn covariance(&mut self, problem: &Problem) -> Option<DMatrix<f64>> {
+        let noise = self.noise.clone();
+        let system = self.normal_equations(problem, &noise)?;
+        let m = system.used.len();
+        let scale: Vec<f64> = (0..m).map(|i| system.hessian[(i, i)].sqrt().max(1e-300)).collect();
+        let mut scaled = system.hessian.clone();
+        for i in 0..m {
+            for j in 0..m {
+                scaled[(i, j)] /= scale[i] * scale[j];
+            }
+            scaled[(i, i)] += 1e-12;
+        }
+        let inverse = scaled.cholesky()?.inverse();
+        let n = self.theta.len();
+        let mut covariance = DMatrix::zeros(n, n);
+        for (i, &a) in system.used.iter().enumerate() {
+            for (j, &b) in system.used.iter().enumerate() {
+                covariance[(a, b)] = inverse[(i, j)] / (scale[i] * scale[j]);
+            }
+        }
+        Some(covariance)
+    }
+}
+
+struct NormalEquations {
+    hessian: DMatrix<f64>,
+    gradient: DVector<f64>,
+    used: Vec<usize>,
+    total: usize,
+}
+
+impl NormalEquations {
+    /// The damped step, in units of each number's own curvature.
+    fn step(&self, damping: f64) -> Option<DVector<f64>> {
+        let m = self.used.len();
+        let scale: Vec<f64> = (0..m).map(|i| self.hessian[(i, i)].sqrt().max(1e-300)).collect();
+        let mut h = self.hessian.clone();
+        for i in 0..m {
+            for j in 0..m {
+                h[(i, j)] /= scale[i] * scale[j];
+            }
+            h[(i, i)] += damping + 1e-12;
+        }
+        let g = DVector::from_iterator(m, (0..m).map(|i| self.gradient[i] / scale[i]));
+        let solved = h.cholesky()?.solve(&g);
+        let mut step = DVector::zeros(self.total);
+        for (i, &at) in self.used.iter().enumerate() {
+            step[at] = solved[i] / scale[i];
+        }
+        step.iter().all(|v| v.is_finite()).then_some(step)
+    }
+}
+
+/// First guesses of the difference steps; they adapt.
+fn first_steps(_structure: &Structure, theta: &[f64]) -> Vec<f64> {
+    theta.iter().map(|v| (v.abs() * 1e-5).max(1e-7)).collect()
+}

@@ -1,0 +1,410 @@
+//! Decides: consistent, parameters, named, family or unexplained.
+
+use rayon::prelude::*;
+
+use super::adequacy::{Adequacy, adequacy};
+use super::data::Data;
+use super::effects::{self, Action, Definition, Needs, Sense, Unit};
+use super::exact::{Freeze, frozen, spacing};
+use super::fit::{Effort, Fit, Problem};
+use super::search::{Boring, Ranked, fit_lead, second_effects, single_effects};
+use super::structure::{Direction, Functionals, Signal, Structure, dot};
+
+/// Places, laws and starting values that are tried on one recording, about: a name among so many needs
+/// `2 ln(300)` more than nothing at all (the maximum of that many chi-squares with one degree of freedom).
+const TRIED: f64 = 300.0;
+/// Names whose criteria differ by less explain the recording equally well (Kass and Raftery 1995: 6 is "strong").
+const TIE: f64 = 6.0;
+/// A missing resonance imitates any linear misfit; it must lead by this share of its gain.
+const MODE_HANDICAP: f64 = 0.01;
+/// A second effect must bring this share of what the first brought: misfit of the first breeds false seconds
+/// (math/explain.md, choice 9).
+const SECOND_SHARE: f64 = 0.1;
+/// ... and at least this much.
+const SECOND_GAIN: f64 = 30.0;
+/// Share of the innovation variance that rounding to levels must make up to be named.
+const COARSE: f64 = 0.25;
+
+/// The answer's kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Verdict {
+    /// No difference beyond noise.
+    Consistent,
+    /// Same physics, other parameters or another initial state.
+    Parameters,
+    /// The missing physics has a name.
+    Named,
+    /// Two or more kinds explain it equally well.
+    Family,
+    /// Something is missing that nothing in the library explains.
+    Unexplained,
+}
+
+/// A rival of the answer.
+#[derive(Debug, Clone)]
+pub(crate) struct Rival {
+    pub definition: &'static Definition,
+    /// How much better (in the criterion) than the best boring explanation.
+    pub gain: f64,
+}
+
+/// All that was found.
+#[derive(Debug, Clone)]
+pub(crate) struct Finding {
+    pub verdict: Verdict,
+    pub boring: Boring,
+    /// The model that stands: boring or augmented.
+    pub model: Fit,
+    /// Best augmented model, named or not.
+    pub augmented: Option<Fit>,
+    /// How much better it is than the best boring explanation.
+    pub gain: f64,
+    /// Others, best first.
+    pub rivals: Vec<Rival>,
+    pub freezes: Vec<Freeze>,
+    /// Output and step of a coarse sensor.
+    pub coarse: Option<(usize, f64)>,
+    pub adequacy: Option<Adequacy>,
+    pub count: usize,
+}
+
+/// Runs the whole inquiry. `structure` is the simulation as it is known.
+pub(crate) fn inquire(
+    data: &Data,
+    structure: &Structure,
+    allowed: &(dyn Fn(&Definition) -> bool + Sync),
+) -> Option<(Finding, super::noise::Mask)> {
+    let mut problem = Problem::new(data);
+    let said = structure.simulate(&structure.given(), data)?;
+    let freezes = if allowed(effects::find("sensor_freeze", "")?) {
+        frozen(data, &said)
+    } else {
+        Vec::new()
+    };
+    for freeze in &freezes {
+        let mask = &mut problem.mask[freeze.segment * data.outputs + freeze.output];
+        // The whitening filter looks back over its order.
+        let to = (freeze.to + super::noise::MOST_ORDER).min(mask.len());
+        mask[freeze.from + 1..to].fill(false);
+    }
+    let count = problem.count();
+    let boring = Boring::fit(&problem, structure)?;
+    let base = boring.best(count).criterion(count);
+    let coarse = if allowed(effects::find("sensor_quantization", "")?) {
+        coarse_sensor(&problem, boring.best(count))
+    } else {
+        None
+    };
+    let mut finding = Finding {
+        verdict: Verdict::Consistent,
+        model: boring.best(count).clone(),
+        boring,
+        augmented: None,
+        gain: 0.0,
+        rivals: Vec::new(),
+        freezes,
+        coarse: coarse.map(|(output, step, _)| (output, step)),
+        adequacy: None,
+        count,
+    };
+    let dominated = coarse.is_some_and(|(_, _, share)| share > 0.5);
+    if dominated || coarse.is_some_and(|c| c.2 > 0.3) {
+        // Rounding is most of what is left: it is the answer, and its error would be taken for anything.
+        finding.verdict = Verdict::Named;
+        finding.model = finding.boring.frozen(count).clone();
+        return Some((finding, problem.mask));
+    }
+    let known = structure.effects.len();
+    let mut ranked = single_effects(&problem, &finding.boring, allowed);
+    ranked.extend(derived(&problem, &ranked, known, base, allowed));
+    for r in &mut ranked {
+        r.criterion += penalty(r, known, base, count);
+    }
+    ranked.retain(|r| sane(&problem, &r.fit, known));
+    ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    finding.rivals = rivals(&ranked, known, base);
+    let needed = 2.0 * TRIED.ln();
+    let best = ranked.first().filter(|r| base - r.criterion > needed);
+    if let Some(best) = best {
+        let mut fit = polished(&problem, &best.fit);
+        let mut gain = base - fit.criterion(count);
+        if let Some(pair) = pair(&problem, &ranked, known, base, allowed) {
+            let polished = polished(&problem, &pair);
+            gain = gain.max(base - polished.criterion(count));
+            fit = polished;
+        }
+        finding.gain = gain;
+        finding.adequacy = adequacy(&problem, &fit, Some(finding.boring.best(count)));
+        finding.augmented = Some(fit.clone());
+        let holds = finding.adequacy.is_none_or(|a| a.holds());
+        finding.verdict = if !holds {
+            Verdict::Unexplained
+        } else if finding
+            .rivals
+            .iter()
+            .any(|r| r.definition.id != fit.structure.effects[known].definition.id && gain - r.gain < TIE)
+            && fit.structure.effects.len() == known + 1
+        {
+            Verdict::Family
+        } else {
+            Verdict::Named
+        };
+        finding.model = fit;
+    } else {
+        finding.adequacy = adequacy(&problem, finding.boring.best(count), None);
+        let holds = finding.adequacy.is_none_or(|a| a.holds());
+        finding.verdict = if !holds {
+            Verdict::Unexplained
+        } else if !finding.freezes.is_empty() || finding.coarse.is_some() {
+            Verdict::Named
+        } else if finding.boring.given.criterion(count) <= base + 1e-9 {
+            Verdict::Consistent
+        } else {
+            Verdict::Parameters
+        };
+    }
+    Some((finding, problem.mask))
+}
+
+/// An output on a lattice so coarse that rounding is a good part of the residual: `(output, step, share)`.
+fn coarse_sensor(problem: &Problem, fit: &Fit) -> Option<(usize, f64, f64)> {
+    problem
+        .data
+        .outputs_as_series()
+        .enumerate()
+        .filter_map(|(series, y)| {
+            let step = spacing(y)?;
+            let residual = &fit.residual[series];
+            let variance = residual.iter().map(|r| r * r).sum::<f64>() / residual.len().max(1) as f64;
+            // Variance of rounding: step^2/12.
+            let share = step * step / 12.0 / variance.max(1e-300);
+            (share > COARSE).then_some((series % problem.data.outputs, step, share))
+        })
+        .max_by(|a, b| a.2.total_cmp(&b.2))
+}
+
+/// What some effects owe beyond the count of their parameters.
+fn penalty(ranked: &Ranked, known: usize, base: f64, count: usize) -> f64 {
+    let Some(effect) = ranked.fit.structure.effects.get(known) else {
+        return 0.0;
+    };
+    let changes = effect.definition.parameters.iter().any(|p| p.name == "from" && p.unit == Unit::Second);
+    let mut owed = 0.0;
+    if changes {
+        // A change point is chosen among all samples: it counts about twice (Zhang and Siegmund 2007).
+        owed += (count as f64).ln();
+    }
+    if effect.definition.id == "extra_mode" {
+        owed += MODE_HANDICAP * (base - ranked.criterion).max(0.0);
+    }
+    owed
+}
+
+/// A law that grows out of a simpler one which fits already: `(id, variant)` of both, and what its further numbers
+/// start from.
+struct Refinement {
+    simple: (&'static str, &'static str),
+    rich: (&'static str, &'static str),
+    more: More,
+}
+
+enum More {
+    /// Nothing: another reading of the same numbers.
+    Nothing,
+    /// Logarithms of pure numbers.
+    Numbers(&'static [f64]),
+    /// Breakaway excess and Stribeck velocity.
+    Breakaway,
+    /// Multiples of the sample time.
+    Samples(&'static [f64]),
+}
+
+const REFINEMENTS: &[Refinement] = &[
+    Refinement { simple: ("coulomb_friction", ""), rich: ("stribeck_friction", ""), more: More::Breakaway },
+    Refinement { simple: ("coulomb_friction", "presliding"), rich: ("stribeck_friction", "presliding"), more: More::Breakaway },
+    Refinement { simple: ("input_saturation", ""), rich: ("input_saturation", "soft"), more: More::Numbers(&[4.0, 12.0]) },
+    Refinement { simple: ("sensor_saturation", ""), rich: ("sensor_saturation", "soft"), more: More::Numbers(&[4.0, 12.0]) },
+    Refinement { simple: ("end_stop", "upper"), rich: ("end_stop", "upper damped"), more: More::Samples(&[0.5]) },
+    Refinement { simple: ("end_stop", "lower"), rich: ("end_stop", "lower damped"), more: More::Samples(&[0.5]) },
+    Refinement { simple: ("end_stop", "both"), rich: ("end_stop", "both damped"), more: More::Samples(&[0.5]) },
+    Refinement { simple: ("input_delay", ""), rich: ("input_delay", "interpolated"), more: More::Nothing },
+    Refinement { simple: ("input_rate_limit", ""), rich: ("input_rate_limit", "held"), more: More::Nothing },
+    Refinement { simple: ("actuator_lag", ""), rich: ("actuator_lag", "held"), more: More::Nothing },
+];
+
+/// Refinements of what is in the running: within this share of the best gain.
+const IN_THE_RUNNING: f64 = 0.25;
+
+/// Richer and other forms of the laws that fit well.
+fn derived(
+    problem: &Problem,
+    ranked: &[Ranked],
+    known: usize,
+    base: f64,
+    allowed: &(dyn Fn(&Definition) -> bool + Sync),
+) -> Vec<Ranked> {
+    let count = problem.count();
+    let Some(least) = ranked.iter().map(|r| r.criterion).reduce(f64::min) else {
+        return Vec::new();
+    };
+    let reach = least + (IN_THE_RUNNING * (base - least)).max(2.0 * TRIED.ln());
+    let mut jobs: Vec<(Structure, Vec<f64>, super::noise::Noise)> = Vec::new();
+    for refinement in REFINEMENTS {
+        let (Some(simple), Some(rich)) = (
+            effects::find(refinement.simple.0, refinement.simple.1),
+            effects::find(refinement.rich.0, refinement.rich.1),
+        ) else {
+            continue;
+        };
+        let best = ranked
+            .iter()
+            .filter(|r| std::ptr::eq(r.fit.structure.effects[known].definition, simple))
+            .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+            .filter(|r| r.criterion <= reach);
+        let Some(best) = best.filter(|_| allowed(rich)) else {
+            continue;
+        };
+        let starts: Vec<Vec<f64>> = match &refinement.more {
+            More::Nothing => vec![vec![]],
+            More::Numbers(numbers) => numbers.iter().map(|v| vec![v.ln()]).collect(),
+            More::Samples(samples) => samples
+                .iter()
+                .map(|v| vec![(v * problem.data.sample_time).ln()])
+                .collect(),
+            More::Breakaway => {
+                let speed = speed_scale(problem, &best.fit, known);
+                [0.02, 0.1, 0.4].iter().map(|share| vec![0.4_f64.ln(), (share * speed).ln()]).collect()
+            }
+        };
+        for more in starts {
+            let mut structure = best.fit.structure.clone();
+            structure.effects[known].definition = rich;
+            let mut theta = best.fit.theta.clone();
+            theta.extend(more);
+            jobs.push((structure, theta, best.fit.noise.clone()));
+        }
+    }
+    jobs.into_par_iter()
+        .filter_map(|(structure, theta, noise)| Fit::run(problem, structure, theta, Some(&noise), Effort::RANK))
+        .map(|fit| Ranked {
+            criterion: fit.criterion(count),
+            fit,
+        })
+        .collect()
+}
+
+/// A typical speed of the signal that effect `index` looks at.
+fn speed_scale(problem: &Problem, fit: &Fit, index: usize) -> f64 {
+    let h = problem.data.sample_time;
+    let size = |series: usize| -> Vec<f64> {
+        match fit.structure.effects[index].signal {
+            Signal::Integral(_) => fit.simulated[series].clone(),
+            _ => fit.simulated[series].windows(2).map(|p| (p[1] - p[0]) / h).collect(),
+        }
+    };
+    let output = match fit.structure.effects[index].signal {
+        Signal::Output(o) | Signal::Integral(o) | Signal::Difference(o, _) => o,
+    };
+    effects::level(&size(output), 0.8, f64::abs).max(1e-12)
+}
+
+/// Physics that contradicts itself is no explanation.
+fn sane(problem: &Problem, fit: &Fit, known: usize) -> bool {
+    let plant = fit.structure.plant(&fit.theta);
+    let rows = Functionals::new(&plant);
+    (known..fit.structure.effects.len()).all(|index| {
+        let effect = &fit.structure.effects[index];
+        let shape = fit.structure.shape(&fit.theta, index);
+        if let Action::Force(_, needs, sense) = effect.definition.action {
+            let signal = rows.of(&plant, effect.signal);
+            let direction = fit.structure.direction(&fit.theta, &plant, &rows, index);
+            if sense == Sense::Resists && dot(&signal.rate, &direction) <= 0.0 {
+                return false;
+            }
+            let _ = needs;
+        }
+        let length: f64 = problem.data.segments[0].samples() as f64 * problem.data.sample_time;
+        let start = problem.data.segments[0].start_time;
+        effect.definition.parameters.iter().zip(&shape).all(|(p, v)| match (p.name, p.unit) {
+            // A change needs something before and after it.
+            ("from", Unit::Second) => *v > start + 0.02 * length && *v < start + 0.98 * length,
+            ("presliding_distance", _) => *v < 0.5 * travel(problem, fit, index),
+            ("breakaway_excess", _) => *v > 0.05,
+            ("stribeck_velocity", _) => *v < 1.5 * speed_scale(problem, fit, index),
+            _ => true,
+        })
+    })
+}
+
+/// Half the range of the position that effect `index` looks at, as far as outputs tell.
+fn travel(problem: &Problem, fit: &Fit, index: usize) -> f64 {
+    let h = problem.data.sample_time;
+    let of = |y: &[f64]| effects::level(y, 0.95, f64::abs);
+    match fit.structure.effects[index].signal {
+        Signal::Output(o) => of(&fit.simulated[o]),
+        Signal::Difference(i, j) => of(&fit.simulated[i]) + of(&fit.simulated[j]),
+        Signal::Integral(o) => {
+            let mut at = 0.0;
+            let path: Vec<f64> = fit.simulated[o]
+                .iter()
+                .map(|v| {
+                    at += v * h;
+                    at
+                })
+                .collect();
+            of(&path)
+        }
+    }
+}
+
+/// One line an effect: the best of its forms.
+fn rivals(ranked: &[Ranked], known: usize, base: f64) -> Vec<Rival> {
+    let mut list: Vec<Rival> = Vec::new();
+    for r in ranked {
+        let definition = r.fit.structure.effects[known].definition;
+        if list.iter().all(|l| l.definition.id != definition.id) {
+            list.push(Rival {
+                definition,
+                gain: base - r.criterion,
+            });
+        }
+    }
+    list
+}
+
+/// The fit tried harder.
+fn polished(problem: &Problem, fit: &Fit) -> Fit {
+    Fit::run(problem, fit.structure.clone(), fit.theta.clone(), Some(&fit.noise), Effort::FINAL)
+        .filter(|better| better.deviance < fit.deviance)
+        .unwrap_or_else(|| fit.clone())
+}
+
+/// A second effect beside one of the two best singles, where the best single leaves something.
+fn pair(
+    problem: &Problem,
+    ranked: &[Ranked],
+    known: usize,
+    base: f64,
+    allowed: &(dyn Fn(&Definition) -> bool + Sync),
+) -> Option<Fit> {
+    let count = problem.count();
+    let best = ranked.first()?;
+    let id = |r: &Ranked| r.fit.structure.effects[known].definition.id;
+    let mut firsts = vec![best];
+    firsts.extend(ranked.iter().find(|r| id(r) != id(best)));
+    let single_gain = base - best.criterion;
+    let found = second_effects(problem, &firsts, allowed)
+        .into_iter()
+        .filter(|r| sane(problem, &r.fit, known))
+        .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
+    let gain = best.criterion - found.fit.criterion(count);
+    (gain > SECOND_GAIN.max(SECOND_SHARE * single_gain)).then_some(found.fit)
+}
+
+#[allow(dead_code)]
+fn unused(_: &Needs, _: &Direction) {}
+
+/// Used by the search of a second effect.
+pub(crate) fn refit_with(problem: &Problem, structure: Structure, start: Vec<f64>) -> Option<Fit> {
+    fit_lead(problem, structure, start, Effort::RANK)
+}

@@ -1,0 +1,157 @@
+//! The recursion itself, compiled once for every state dimension.
+
+use super::data::Series;
+use super::effects::{Clock, ForceLaw, Motion};
+use super::plant::Plant;
+
+/// Most states that can be run.
+pub(crate) const MOST_STATES: usize = 12;
+/// A simulated output beyond this many times the size of a sensible one has diverged.
+const DIVERGED: f64 = 1e8;
+
+/// A force made ready for one parameter vector.
+#[derive(Debug, Clone)]
+pub(crate) struct ActiveForce {
+    pub law: ForceLaw,
+    pub parameters: Vec<f64>,
+    /// The rate is needed; else it is not computed.
+    pub rate_matters: bool,
+    pub position: Vec<f64>,
+    pub rate: Vec<f64>,
+    pub rate_feedthrough: Vec<f64>,
+    pub direction: Vec<f64>,
+    pub rate_gain: f64,
+    pub input: usize,
+}
+
+/// Outputs of `plant` under `inputs` and `forces` from the state `x0`; `None` when they diverge.
+pub(crate) fn run(
+    plant: &Plant,
+    forces: &[ActiveForce],
+    x0: &[f64],
+    inputs: &[Vec<f64>],
+    samples: usize,
+    clock: &Clock,
+) -> Option<Series> {
+    macro_rules! dispatch {
+        ($($n:literal)*) => {
+            match plant.states {
+                $($n => sized::<$n>(plant, forces, x0, inputs, samples, clock),)*
+                _ => None,
+            }
+        };
+    }
+    dispatch!(0 1 2 3 4 5 6 7 8 9 10 11 12)
+}
+
+struct SizedForce<'a, const N: usize> {
+    force: &'a ActiveForce,
+    position: [f64; N],
+    rate: [f64; N],
+    direction: [f64; N],
+    position_gain: f64,
+    memory: [f64; 2],
+}
+
+fn array<const N: usize>(values: &[f64]) -> [f64; N] {
+    let mut a = [0.0; N];
+    for (a, v) in a.iter_mut().zip(values) {
+        *a = *v;
+    }
+    a
+}
+
+fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    let mut sum = 0.0;
+    for i in 0..N {
+        sum += a[i] * b[i];
+    }
+    sum
+}
+
+fn sized<const N: usize>(
+    plant: &Plant,
+    forces: &[ActiveForce],
+    x0: &[f64],
+    inputs: &[Vec<f64>],
+    samples: usize,
+    clock: &Clock,
+) -> Option<Series> {
+    let r = plant.inputs;
+    let mut a = [[0.0; N]; N];
+    for (i, row) in a.iter_mut().enumerate() {
+        *row = array(&plant.a[i * N..(i + 1) * N]);
+    }
+    let c: Vec<[f64; N]> = (0..plant.outputs).map(|o| array(plant.c_row(o))).collect();
+    let b: Vec<[f64; N]> = (0..r).map(|j| array(&plant.b_column(j))).collect();
+    let direct: Vec<Vec<usize>> = (0..plant.outputs)
+        .map(|o| (0..r).filter(|j| plant.d[o * r + j] != 0.0).collect())
+        .collect();
+    let mut forces: Vec<SizedForce<N>> = forces
+        .iter()
+        .map(|force| SizedForce {
+            force,
+            position: array(&force.position),
+            rate: array(&force.rate),
+            direction: array(&force.direction),
+            position_gain: force.position.iter().zip(&force.direction).map(|(c, b)| c * b).sum(),
+            memory: [0.0; 2],
+        })
+        .collect();
+    let mut outputs = vec![vec![0.0; samples]; plant.outputs];
+    let mut x: [f64; N] = array(x0);
+    for k in 0..samples {
+        for (o, row) in c.iter().enumerate() {
+            let mut y = dot(row, &x);
+            for &j in &direct[o] {
+                y += plant.d[o * r + j] * inputs[j][k];
+            }
+            outputs[o][k] = y;
+        }
+        let mut next = [0.0; N];
+        for i in 0..N {
+            next[i] = dot(&a[i], &x);
+        }
+        for (column, input) in b.iter().zip(inputs) {
+            let u = input[k];
+            for i in 0..N {
+                next[i] += column[i] * u;
+            }
+        }
+        if !forces.is_empty() && !next.iter().all(|v| v.abs() < DIVERGED * 1e3) {
+            return None;
+        }
+        for f in &mut forces {
+            let mut rate_input = 0.0;
+            if f.force.rate_matters {
+                for (gain, input) in f.force.rate_feedthrough.iter().zip(inputs) {
+                    rate_input += gain * input[k];
+                }
+            }
+            let motion = Motion {
+                position: dot(&f.position, &x),
+                position_free: dot(&f.position, &next),
+                position_gain: f.position_gain,
+                rate: dot(&f.rate, &x) + rate_input,
+                rate_free: dot(&f.rate, &next) + rate_input,
+                rate_gain: f.force.rate_gain,
+                input: inputs.get(f.force.input).map_or(0.0, |u| u[k]),
+                sample: k,
+                clock: *clock,
+            };
+            let w = (f.force.law)(&f.force.parameters, &motion, &mut f.memory);
+            for i in 0..N {
+                next[i] += f.direction[i] * w;
+            }
+        }
+        x = next;
+        if k % 64 == 0 && !x.iter().all(|v| v.abs() < DIVERGED * 1e3) {
+            return None;
+        }
+    }
+    outputs
+        .iter()
+        .flatten()
+        .all(|y| y.abs() < DIVERGED * 1e3)
+        .then_some(outputs)
+}

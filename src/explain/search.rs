@@ -1,0 +1,234 @@
+//! From boring explanations to ranked physics.
+
+use rayon::prelude::*;
+
+use super::effects::{Definition, Unit};
+use super::fit::{Effort, Fit, Problem};
+use super::noise::Noise;
+use super::screen::{Lead, extended, screen};
+use super::structure::Structure;
+
+/// Effects that are fitted in full from each screening.
+const LEADS_EACH: usize = 6;
+/// Places of one effect that are fitted in full from each screening.
+const PLACES_EACH: usize = 2;
+
+/// Second effects that are fitted beside each first.
+const SECONDS_EACH: usize = 4;
+
+/// The explanations without new physics, each nested in the next.
+#[derive(Debug, Clone)]
+pub(crate) struct Boring {
+    /// The simulation as it was given.
+    pub given: Fit,
+    /// With other initial states.
+    pub initial: Fit,
+    /// With other parameters and initial states.
+    pub full: Fit,
+}
+
+impl Boring {
+    /// All three around `structure`, the simulation as it is known.
+    pub fn fit(problem: &Problem, structure: &Structure) -> Option<Self> {
+        let structure = |plant_free, initial_free| Structure {
+            plant_free,
+            initial_free,
+            ..structure.clone()
+        };
+        let fit = |structure: Structure| {
+            let theta = structure.given();
+            Fit::run(problem, structure, theta, None, Effort::FINAL)
+        };
+        Some(Self {
+            given: fit(structure(false, false))?,
+            initial: fit(structure(false, true))?,
+            full: fit(structure(true, true))?,
+        })
+    }
+
+    /// The one with the least criterion.
+    pub fn best(&self, count: usize) -> &Fit {
+        [&self.given, &self.initial, &self.full]
+            .into_iter()
+            .min_by(|a, b| a.criterion(count).total_cmp(&b.criterion(count)))
+            .unwrap_or(&self.given)
+    }
+
+    /// The frozen one with the least criterion: the plant as it was given.
+    pub fn frozen(&self, count: usize) -> &Fit {
+        if self.initial.criterion(count) < self.given.criterion(count) {
+            &self.initial
+        } else {
+            &self.given
+        }
+    }
+}
+
+/// One fitted explanation.
+#[derive(Debug, Clone)]
+pub(crate) struct Ranked {
+    pub fit: Fit,
+    pub criterion: f64,
+}
+
+/// Screens around `bases` and fits what stands out, frozen and free; best first.
+pub(crate) fn single_effects(
+    problem: &Problem,
+    boring: &Boring,
+    allowed: &(dyn Fn(&Definition) -> bool + Sync),
+) -> Vec<Ranked> {
+    let count = problem.count();
+    let mut leads: Vec<(usize, Lead)> = Vec::new();
+    let bases = [boring.frozen(count).clone(), boring.full.clone()];
+    let screens: Vec<(usize, Vec<Lead>)> = [(0, false), (0, true), (1, false), (1, true)]
+        .into_par_iter()
+        .map(|(index, white)| {
+            let mut basis = bases[index].clone();
+            let noise = if white {
+                Noise::white(&basis.residual, problem.data.outputs, &problem.mask)
+            } else {
+                basis.noise.clone()
+            };
+            (index, screen(problem, &mut basis, &noise, allowed))
+        })
+        .collect();
+    for (index, list) in screens {
+        for lead in shortlist(list, LEADS_EACH, PLACES_EACH) {
+            leads.push((index, lead));
+        }
+    }
+    let mut ranked: Vec<Ranked> = leads
+        .par_iter()
+        .flat_map_iter(|(index, lead)| {
+            let basis = &bases[*index];
+            let mut fits = Vec::new();
+            let frozen = boring.frozen(count);
+            let (structure, start) = extended(&frozen.structure, &frozen.theta, lead);
+            fits.extend(fit_lead(problem, structure, start, Effort::RANK));
+            // The same with the plant free: from the basis of the lead.
+            let (structure, start) = if *index == 0 {
+                let full = &boring.full.structure;
+                let mut theta = full.given();
+                if frozen.structure.initial_free {
+                    let from = full.coordinates.len();
+                    let states = frozen.structure.states() * frozen.structure.initial.len();
+                    theta[from..from + states].copy_from_slice(&frozen.theta[..states]);
+                }
+                extended(full, &theta, lead)
+            } else {
+                extended(&basis.structure, &basis.theta, lead)
+            };
+            fits.extend(fit_lead(problem, structure, start, Effort::RANK));
+            fits
+        })
+        .map(|fit| Ranked {
+            criterion: fit.criterion(count),
+            fit,
+        })
+        .collect();
+    ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    ranked
+}
+
+/// The best leads: so many effects, so many places of each.
+fn shortlist(leads: Vec<Lead>, effects: usize, places: usize) -> Vec<Lead> {
+    let mut kept: Vec<Lead> = Vec::new();
+    for lead in leads {
+        let id = lead.instance.definition.id;
+        let same = kept.iter().filter(|l| l.instance.definition.id == id).count();
+        let mut ids: Vec<&str> = kept.iter().map(|l| l.instance.definition.id).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        if same >= places || (same == 0 && ids.len() >= effects) {
+            continue;
+        }
+        kept.push(lead);
+    }
+    kept
+}
+
+/// Fits one lead; times of change are scanned to the sample, since no gradient finds them from afar.
+pub(crate) fn fit_lead(problem: &Problem, structure: Structure, start: Vec<f64>, effort: Effort) -> Option<Fit> {
+    let fit = Fit::run(problem, structure, start, None, effort)?;
+    let Some(at) = change_time(&fit.structure) else {
+        return Some(fit);
+    };
+    let scanned = scan(problem, &fit, at)?;
+    let better = Fit::run(problem, fit.structure.clone(), scanned, Some(&fit.noise), effort)?;
+    Some(if better.deviance < fit.deviance { better } else { fit })
+}
+
+/// Index of the time of change of the last effect, if it has one.
+fn change_time(structure: &Structure) -> Option<usize> {
+    let index = structure.effects.len().checked_sub(1)?;
+    let effect = &structure.effects[index];
+    let at = effect
+        .definition
+        .parameters
+        .iter()
+        .position(|p| p.unit == Unit::Second && p.name == "from")?;
+    Some(structure.effect_offset(index) + effect.amplitudes(structure.states()) + at)
+}
+
+/// Coarse-to-fine scan of number `at`, the others held.
+fn scan(problem: &Problem, fit: &Fit, at: usize) -> Option<Vec<f64>> {
+    let length = problem.data.segments[0].samples() as f64 * problem.data.sample_time;
+    let mut best = fit.theta.clone();
+    let mut least = fit.deviance;
+    let mut width = length / 20.0;
+    while width > 0.5 * problem.data.sample_time {
+        let centre = best[at];
+        for i in -6..=6 {
+            let mut trial = best.clone();
+            trial[at] = centre + width * f64::from(i) / 6.0;
+            let Some(simulated) = fit.structure.simulate(&trial, problem.data) else {
+                continue;
+            };
+            let deviance = fit
+                .noise
+                .deviance(&problem.data.residual(&simulated), &problem.mask);
+            if deviance < least {
+                least = deviance;
+                best = trial;
+            }
+        }
+        width /= 4.0;
+    }
+    Some(best)
+}
+
+/// Second effects beside each of `firsts`: screened around their fits, then fitted jointly; best first.
+pub(crate) fn second_effects(
+    problem: &Problem,
+    firsts: &[&Ranked],
+    allowed: &(dyn Fn(&Definition) -> bool + Sync),
+) -> Vec<Ranked> {
+    let count = problem.count();
+    let leads: Vec<(usize, Lead)> = firsts
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(index, first)| {
+            let mut basis = first.fit.clone();
+            let taken: Vec<&str> = basis.structure.effects.iter().map(|e| e.definition.id).collect();
+            let noise = basis.noise.clone();
+            let other = |d: &Definition| allowed(d) && !taken.contains(&d.id) && d.id != "extra_mode";
+            shortlist(screen(problem, &mut basis, &noise, &other), SECONDS_EACH, 1)
+                .into_iter()
+                .map(move |lead| (index, lead))
+        })
+        .collect();
+    let mut ranked: Vec<Ranked> = leads
+        .par_iter()
+        .filter_map(|(index, lead)| {
+            let first = &firsts[*index].fit;
+            let (structure, start) = extended(&first.structure, &first.theta, lead);
+            fit_lead(problem, structure, start, Effort::RANK)
+        })
+        .map(|fit| Ranked {
+            criterion: fit.criterion(count),
+            fit,
+        })
+        .collect();
+    ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    ranked
+}

@@ -1,0 +1,490 @@
+//! An augmented model's structure: which numbers are free, and how they become a simulation.
+//!
+//! The parameter vector holds, in this order, the free numbers of the plant ([`Coordinates`]), the initial state of
+//! every segment, the levels of the outputs, and the numbers of each effect. Logarithmic parameters are held as
+//! logarithms.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use super::coordinates::{Coordinates, Derivatives};
+use super::data::{Data, Segment, Series};
+use super::effects::{Action, Clock, Definition};
+use super::plant::Plant;
+use super::run::{ActiveForce, run};
+
+/// The position and rate that a force looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Signal {
+    /// An output is the position, its derivative the rate.
+    Output(usize),
+    /// An output is the rate: its integral is the position.
+    Integral(usize),
+    /// Position of one output relative to another.
+    Difference(usize, usize),
+}
+
+/// How a force enters the state equation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Direction {
+    /// As this input does: one amplitude, in the input's unit.
+    Matched(usize),
+    /// Through a direction of its own: a number a state.
+    Free,
+}
+
+/// One effect at one place.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Instance {
+    pub definition: &'static Definition,
+    /// Input or output index, for effects on channels and paths.
+    pub channel: usize,
+    /// What a force looks at.
+    pub signal: Signal,
+    /// How a force enters.
+    pub direction: Direction,
+}
+
+impl Instance {
+    /// Numbers before the shape parameters: amplitude or direction of a force.
+    pub fn amplitudes(&self, states: usize) -> usize {
+        match (self.definition.action, self.direction) {
+            (Action::Force(..), Direction::Matched(_)) => 1,
+            (Action::Force(..), Direction::Free) => states,
+            _ => 0,
+        }
+    }
+
+    /// Numbers after the shape parameters: residues of a mode, the column of a missing path.
+    pub fn coefficients(&self, states: usize, outputs: usize) -> usize {
+        match self.definition.action {
+            Action::Mode => 2 * outputs,
+            Action::MissingPath => states,
+            _ => 0,
+        }
+    }
+
+    /// All its numbers.
+    pub fn len(&self, states: usize, outputs: usize) -> usize {
+        self.amplitudes(states) + self.definition.parameters.len() + self.coefficients(states, outputs)
+    }
+}
+
+/// Which numbers are free.
+#[derive(Debug, Clone)]
+pub(crate) struct Structure {
+    pub coordinates: Arc<Coordinates>,
+    /// The plant's numbers are free; else those of the simulation.
+    pub plant_free: bool,
+    /// The initial states are free; else they are `initial`.
+    pub initial_free: bool,
+    /// Initial state of each segment while it is not free.
+    pub initial: Vec<Vec<f64>>,
+    /// The levels of the outputs are free (the simulation has operating points); else zero.
+    pub levels_free: bool,
+    /// All effects; the first `known.len()` of them are in the simulation already.
+    pub effects: Vec<Instance>,
+    /// Numbers of the effects that the simulation knows; they are free when the plant is.
+    pub known: Vec<Vec<f64>>,
+}
+
+impl Structure {
+    pub fn states(&self) -> usize {
+        self.coordinates.given.states
+    }
+
+    pub fn outputs(&self) -> usize {
+        self.coordinates.given.outputs
+    }
+
+    /// Numbers before those of the effects.
+    pub fn linear_len(&self) -> usize {
+        (if self.plant_free { self.coordinates.len() } else { 0 })
+            + (if self.initial_free { self.states() * self.initial.len() } else { 0 })
+            + (if self.levels_free { self.outputs() } else { 0 })
+    }
+
+    /// Effects whose numbers are in the parameter vector.
+    fn free_effects(&self) -> std::ops::Range<usize> {
+        (if self.plant_free { 0 } else { self.known.len() })..self.effects.len()
+    }
+
+    pub fn len(&self) -> usize {
+        self.effect_offset(self.effects.len())
+    }
+
+    /// Where the numbers of effect `index` begin (those of known effects have no place while they are fixed).
+    pub fn effect_offset(&self, index: usize) -> usize {
+        self.linear_len()
+            + self.effects[self.free_effects().start.min(index)..index]
+                .iter()
+                .map(|e| e.len(self.states(), self.outputs()))
+                .sum::<usize>()
+    }
+
+    /// The numbers of effect `index`.
+    pub fn effect_numbers<'a>(&'a self, theta: &'a [f64], index: usize) -> &'a [f64] {
+        if !self.plant_free && index < self.known.len() {
+            return &self.known[index];
+        }
+        let from = self.effect_offset(index);
+        &theta[from..from + self.effects[index].len(self.states(), self.outputs())]
+    }
+
+    /// The linear numbers, and those of the known effects, as they were given.
+    pub fn given(&self) -> Vec<f64> {
+        let mut theta = self.given_linear();
+        if self.plant_free {
+            theta.extend(self.known.iter().flatten());
+        }
+        theta
+    }
+
+    /// The linear numbers of the simulation as it was given.
+    fn given_linear(&self) -> Vec<f64> {
+        let mut theta = Vec::with_capacity(self.linear_len());
+        if self.plant_free {
+            theta.extend(self.coordinates.numbers(&self.coordinates.given));
+        }
+        if self.initial_free {
+            theta.extend(self.initial.iter().flatten());
+        }
+        if self.levels_free {
+            theta.extend(std::iter::repeat_n(0.0, self.outputs()));
+        }
+        theta
+    }
+
+    /// Bounds of each number, on the scale it is held in.
+    pub fn bounds(&self) -> Vec<(f64, f64)> {
+        let open = (f64::NEG_INFINITY, f64::INFINITY);
+        let mut bounds = vec![open; self.linear_len()];
+        for effect in &self.effects[self.free_effects()] {
+            let amplitude = match (effect.definition.action, effect.direction) {
+                (Action::Force(_, _, super::effects::Sense::Resists), Direction::Matched(_)) => (0.0, f64::INFINITY),
+                _ => open,
+            };
+            bounds.extend(std::iter::repeat_n(amplitude, effect.amplitudes(self.states())));
+            bounds.extend(effect.definition.parameters.iter().map(|p| {
+                if p.logarithmic {
+                    (p.lower.ln(), p.upper.ln())
+                } else {
+                    (p.lower, p.upper)
+                }
+            }));
+            bounds.extend(std::iter::repeat_n(
+                open,
+                effect.coefficients(self.states(), self.outputs()),
+            ));
+        }
+        bounds
+    }
+
+    /// The plant that these numbers stand for.
+    pub fn plant(&self, theta: &[f64]) -> Plant {
+        if self.plant_free {
+            self.coordinates.plant(&theta[..self.coordinates.len()])
+        } else {
+            self.coordinates.given.clone()
+        }
+    }
+
+    /// Initial state of segment `index`.
+    pub fn initial_state<'a>(&'a self, theta: &'a [f64], index: usize) -> &'a [f64] {
+        let n = self.states();
+        if self.initial_free {
+            let from = (if self.plant_free { self.coordinates.len() } else { 0 }) + n * index;
+            &theta[from..from + n]
+        } else {
+            &self.initial[index]
+        }
+    }
+
+    /// Level of each output.
+    pub fn levels(&self, theta: &[f64]) -> Vec<f64> {
+        let l = self.outputs();
+        if self.levels_free {
+            theta[self.linear_len() - l..self.linear_len()].to_vec()
+        } else {
+            vec![0.0; l]
+        }
+    }
+
+    /// Shape parameters of effect `index` in physical units.
+    pub fn shape(&self, theta: &[f64], index: usize) -> Vec<f64> {
+        let effect = &self.effects[index];
+        let numbers = &self.effect_numbers(theta, index)[effect.amplitudes(self.states())..];
+        effect
+            .definition
+            .parameters
+            .iter()
+            .zip(numbers)
+            .map(|(p, v)| if p.logarithmic { v.exp() } else { *v })
+            .collect()
+    }
+
+    /// Direction through which force `index` enters, amplitude included (`n`).
+    pub fn direction(&self, theta: &[f64], plant: &Plant, rows: &Functionals, index: usize) -> Vec<f64> {
+        let numbers = self.effect_numbers(theta, index);
+        match self.effects[index].direction {
+            Direction::Free => numbers[..self.states()].to_vec(),
+            Direction::Matched(input) => {
+                let sign = matched_sign(plant, &rows.of(plant, self.effects[index].signal).rate, input);
+                plant
+                    .b_column(input)
+                    .iter()
+                    .map(|b| sign * numbers[0] * b)
+                    .collect()
+            }
+        }
+    }
+
+    /// Simulated outputs of all segments; `None` when they leave any sensible range.
+    pub fn simulate(&self, theta: &[f64], data: &Data) -> Option<Series> {
+        let plant = self.plant(theta);
+        let prepared = self.prepare(theta, &plant);
+        let mut outputs = Vec::with_capacity(data.segments.len() * data.outputs);
+        for (index, segment) in data.segments.iter().enumerate() {
+            let clock = Clock {
+                start: segment.start_time,
+                step: data.sample_time,
+                fresh: false,
+            };
+            let x0 = self.initial_state(theta, index);
+            outputs.extend(self.simulate_segment(theta, &plant, &prepared, segment, x0, &clock)?);
+        }
+        Some(outputs)
+    }
+
+    /// Outputs on a new input from the initial state `x0`.
+    pub fn simulate_fresh(&self, theta: &[f64], segment: &Segment, sample_time: f64, x0: &[f64]) -> Option<Series> {
+        let plant = self.plant(theta);
+        let prepared = self.prepare(theta, &plant);
+        let clock = Clock {
+            start: segment.start_time,
+            step: sample_time,
+            fresh: true,
+        };
+        self.simulate_segment(theta, &plant, &prepared, segment, x0, &clock)
+    }
+
+    pub fn prepare(&self, theta: &[f64], plant: &Plant) -> Vec<ActiveForce> {
+        let mut forces = Vec::new();
+        let mut rows: Option<Functionals> = None;
+        for (index, effect) in self.effects.iter().enumerate() {
+            let Action::Force(law, ..) = effect.definition.action else {
+                continue;
+            };
+            let rows = rows.get_or_insert_with(|| Functionals::new(plant));
+            let signal = rows.of(plant, effect.signal);
+            let direction = self.direction(theta, plant, rows, index);
+            let rate_gain = dot(&signal.rate, &direction);
+            forces.push(ActiveForce {
+                law,
+                parameters: self.shape(theta, index),
+                rate_matters: true,
+                position: signal.position,
+                rate: signal.rate,
+                rate_feedthrough: signal.rate_feedthrough,
+                direction,
+                rate_gain,
+                input: match effect.direction {
+                    Direction::Matched(input) => input,
+                    Direction::Free => 0,
+                },
+            });
+        }
+        forces
+    }
+
+    /// Inputs as the plant sees them, and their moments within the intervals where a law has any.
+    pub fn effective_inputs<'a>(&self, theta: &[f64], segment: &'a Segment, clock: &Clock) -> (Cow<'a, Series>, Option<Series>) {
+        let mut inputs = Cow::Borrowed(&segment.inputs);
+        let mut moments: Option<Series> = None;
+        for (index, effect) in self.effects.iter().enumerate() {
+            if let Action::Input(law) = effect.definition.action {
+                let moments =
+                    moments.get_or_insert_with(|| segment.inputs.iter().map(|u| vec![0.0; u.len()]).collect());
+                law(
+                    &self.shape(theta, index),
+                    &mut inputs.to_mut()[effect.channel],
+                    &mut moments[effect.channel],
+                    clock,
+                );
+            }
+        }
+        (inputs, moments.filter(|m| m.iter().flatten().any(|v| *v != 0.0)))
+    }
+
+    fn simulate_segment(
+        &self,
+        theta: &[f64],
+        plant: &Plant,
+        forces: &[ActiveForce],
+        segment: &Segment,
+        x0: &[f64],
+        clock: &Clock,
+    ) -> Option<Series> {
+        let (mut inputs, moments) = self.effective_inputs(theta, segment, clock);
+        let mut with_paths = Cow::Borrowed(plant);
+        for (index, effect) in self.effects.iter().enumerate() {
+            if matches!(effect.definition.action, Action::MissingPath) {
+                let plant = with_paths.to_mut();
+                for (i, b) in self.effect_numbers(theta, index).iter().enumerate() {
+                    plant.b[i * plant.inputs + effect.channel] = *b;
+                }
+            }
+        }
+        if let Some(moments) = moments {
+            with_paths = Cow::Owned(with_moments(&with_paths));
+            inputs.to_mut().extend(moments);
+        }
+        let mut outputs = run(&with_paths, forces, x0, &inputs, segment.samples(), clock)?;
+        for (index, effect) in self.effects.iter().enumerate() {
+            if matches!(effect.definition.action, Action::Mode) {
+                let residues = &self.effect_numbers(theta, index)[effect.definition.parameters.len()..];
+                add_mode(&self.shape(theta, index), residues, &inputs[effect.channel], clock, &mut outputs);
+            }
+        }
+        if self.levels_free {
+            for (output, level) in outputs.iter_mut().zip(self.levels(theta)) {
+                for y in output {
+                    *y += level;
+                }
+            }
+        }
+        for (index, effect) in self.effects.iter().enumerate() {
+            if let Action::Sensor(law) = effect.definition.action
+                && (effect.definition.persists || !clock.fresh)
+            {
+                law(&self.shape(theta, index), &mut outputs[effect.channel], clock);
+            }
+        }
+        Some(outputs)
+    }
+}
+
+/// The plant with the first moments of its inputs as further inputs.
+pub(crate) fn with_moments(plant: &Plant) -> Plant {
+    let moment = Derivatives::new(plant).moment;
+    let (n, r, l) = (plant.states, plant.inputs, plant.outputs);
+    let mut wider = plant.clone();
+    wider.inputs = 2 * r;
+    wider.b = (0..n)
+        .flat_map(|i| (0..2 * r).map(move |j| (i, j)))
+        .map(|(i, j)| if j < r { plant.b[i * r + j] } else { moment[j - r][i] })
+        .collect();
+    wider.d = (0..l)
+        .flat_map(|o| (0..2 * r).map(move |j| (o, j)))
+        .map(|(o, j)| if j < r { plant.d[o * r + j] } else { 0.0 })
+        .collect();
+    wider
+}
+
+/// Adds the response of a second-order mode, `q+ = p q + (1 - |p|) u`, `y += a Re q + b Im q`.
+pub(crate) fn add_mode(shape: &[f64], residues: &[f64], input: &[f64], clock: &Clock, outputs: &mut Series) {
+    let w = std::f64::consts::TAU * shape[0] * clock.step;
+    let damping = shape[1].min(0.999);
+    let radius = (-damping * w).exp();
+    let angle = w * (1.0 - damping * damping).sqrt();
+    let (im, re) = (radius * angle.sin(), radius * angle.cos());
+    let gain = 1.0 - radius;
+    let (mut q_re, mut q_im) = (0.0, 0.0);
+    for (k, u) in input.iter().enumerate() {
+        for (output, residue) in outputs.iter_mut().zip(residues.chunks_exact(2)) {
+            output[k] += residue[0] * q_re + residue[1] * q_im;
+        }
+        (q_re, q_im) = (re * q_re - im * q_im + gain * u, re * q_im + im * q_re);
+    }
+}
+
+/// Rows of a position, its rate, and what inputs add to the rate directly.
+#[derive(Debug, Clone)]
+pub(crate) struct SignalRows {
+    pub position: Vec<f64>,
+    pub rate: Vec<f64>,
+    pub rate_feedthrough: Vec<f64>,
+}
+
+/// All rows that a plant's signals can be read with.
+#[derive(Debug, Clone)]
+pub(crate) struct Functionals {
+    derivatives: Derivatives,
+}
+
+impl Functionals {
+    pub fn new(plant: &Plant) -> Self {
+        Self {
+            derivatives: Derivatives::new(plant),
+        }
+    }
+
+    /// Whether the output's integral can be read off the state: it must be a derivative, with no static gain.
+    pub fn integrates(&self, plant: &Plant, output: usize) -> bool {
+        let Some(integral) = &self.derivatives.integral else {
+            return false;
+        };
+        // d/dt (C A_c^-1 x) = C x + C A_c^-1 B_c u: the second term is minus the static gain.
+        let n = plant.states;
+        let identity = nalgebra::DMatrix::identity(n, n);
+        let Some(inverse) = (identity - plant.a_matrix()).try_inverse() else {
+            return false;
+        };
+        let static_gain = plant.c_matrix() * inverse * plant.b_matrix();
+        let row_norm: f64 = integral[output].iter().map(|v| v * v).sum::<f64>().sqrt();
+        let peak = impulse_size(plant, output);
+        row_norm.is_finite()
+            && (0..plant.inputs).all(|j| static_gain[(output, j)].abs() < 0.02 * peak)
+    }
+
+    pub fn of(&self, plant: &Plant, signal: Signal) -> SignalRows {
+        let d = &self.derivatives;
+        let minus = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
+        match signal {
+            Signal::Output(o) => SignalRows {
+                position: plant.c_row(o).to_vec(),
+                rate: d.rate[o].clone(),
+                rate_feedthrough: d.rate_feedthrough[o].clone(),
+            },
+            Signal::Integral(o) => SignalRows {
+                position: d
+                    .integral
+                    .as_ref()
+                    .map_or_else(|| vec![0.0; plant.states], |rows| rows[o].clone()),
+                rate: plant.c_row(o).to_vec(),
+                rate_feedthrough: plant.d[o * plant.inputs..(o + 1) * plant.inputs].to_vec(),
+            },
+            Signal::Difference(i, j) => SignalRows {
+                position: minus(plant.c_row(i), plant.c_row(j)),
+                rate: minus(&d.rate[i], &d.rate[j]),
+                rate_feedthrough: minus(&d.rate_feedthrough[i], &d.rate_feedthrough[j]),
+            },
+        }
+    }
+}
+
+/// Sum of the magnitudes of the impulse response of an output: the most that inputs of size 1 can do.
+fn impulse_size(plant: &Plant, output: usize) -> f64 {
+    let a = plant.a_matrix();
+    let mut x = plant.b_matrix();
+    let c = plant.c_matrix();
+    let mut total = 0.0;
+    for _ in 0..2000 {
+        total += (c.row(output) * &x).norm();
+        x = &a * x;
+    }
+    total.max(1e-300)
+}
+
+/// Sign that lets a positive matched amplitude push the rate up.
+pub(crate) fn matched_sign(plant: &Plant, rate: &[f64], input: usize) -> f64 {
+    if dot(rate, &plant.b_column(input)) < 0.0 {
+        -1.0
+    } else {
+        1.0
+    }
+}
+
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
