@@ -13,6 +13,9 @@ use crate::linalg::multiply_tn;
 
 /// A difference step should move the outputs by this share of their standard deviation.
 const STEP_SHARE: f64 = 1e-5;
+/// Steps stay between these, whatever the outputs do.
+const SMALLEST_STEP: f64 = 1e-14;
+const LARGEST_STEP: f64 = 1e6;
 /// The deviance has settled when an accepted step lowers it by less.
 const SETTLED: f64 = 0.02;
 
@@ -26,6 +29,8 @@ pub(crate) struct Effort {
 }
 
 impl Effort {
+    /// To see what deserves more.
+    pub const SCOUT: Self = Self { rounds: 1, steps: 5 };
     /// To rank candidates.
     pub const RANK: Self = Self { rounds: 2, steps: 12 };
     /// To report.
@@ -225,16 +230,16 @@ impl Fit {
                 };
                 moved[i] += step;
                 let Some(simulated) = self.structure.simulate(&moved, problem.data) else {
-                    self.steps[i] *= 1e-2;
+                    self.steps[i] = (self.steps[i] * 1e-2).max(SMALLEST_STEP);
                     continue;
                 };
                 let size = problem.size(&simulated, &self.simulated);
                 if size == 0.0 {
-                    self.steps[i] *= 1e3;
+                    self.steps[i] = (self.steps[i] * 1e3).min(LARGEST_STEP);
                     continue;
                 }
                 let far = size > 30.0 * STEP_SHARE || size < STEP_SHARE / 30.0;
-                self.steps[i] *= (STEP_SHARE / size).clamp(1e-4, 1e4);
+                self.steps[i] = (self.steps[i] * (STEP_SHARE / size).clamp(1e-4, 1e4)).clamp(SMALLEST_STEP, LARGEST_STEP);
                 if far {
                     continue;
                 }

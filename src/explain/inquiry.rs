@@ -1,14 +1,15 @@
 //! Decides: consistent, parameters, named, family or unexplained.
 
 use rayon::prelude::*;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::adequacy::{Adequacy, adequacy};
 use super::data::Data;
-use super::effects::{self, Action, Definition, Needs, Sense, Unit};
+use super::effects::{self, Action, Definition, Sense, Unit};
 use super::exact::{Freeze, frozen, spacing};
 use super::fit::{Effort, Fit, Problem};
 use super::search::{Boring, Ranked, fit_lead, second_effects, single_effects};
-use super::structure::{Direction, Functionals, Signal, Structure, dot};
+use super::structure::{Functionals, Signal, Structure, dot};
 
 /// Places, laws and starting values that are tried on one recording, about: a name among so many needs
 /// `2 ln(300)` more than nothing at all (the maximum of that many chi-squares with one degree of freedom).
@@ -17,6 +18,15 @@ const TRIED: f64 = 300.0;
 const TIE: f64 = 6.0;
 /// A missing resonance imitates any linear misfit; it must lead by this share of its gain.
 const MODE_HANDICAP: f64 = 0.01;
+/// What an answer owes that physics allows but that is rare, such as a hysteresis that gives energy back: odds of 1
+/// to 400.
+const UNUSUAL: f64 = 12.0;
+/// Probability of a larger difference when the plant is as it was given.
+const SAME_PLANT: f64 = 1e-3;
+/// Share of the samples that a threshold must leave on either side of it.
+const VISITED: f64 = 0.002;
+/// A textbook law is rarely closer to the real one than some percents of what it explains.
+const LAW_IMPERFECTION: f64 = 0.02;
 /// A second effect must bring this share of what the first brought: misfit of the first breeds false seconds
 /// (math/explain.md, choice 9).
 const SECOND_SHARE: f64 = 0.1;
@@ -116,11 +126,15 @@ pub(crate) fn inquire(
     }
     let known = structure.effects.len();
     let mut ranked = single_effects(&problem, &finding.boring, allowed);
-    ranked.extend(derived(&problem, &ranked, known, base, allowed));
+    for refinements in [REFINEMENTS, FURTHER] {
+        ranked.extend(derived(&problem, refinements, &ranked, known, base, allowed));
+    }
     for r in &mut ranked {
         r.criterion += penalty(r, known, base, count);
     }
     ranked.retain(|r| sane(&problem, &r.fit, known));
+    let ranked_all = ranked.clone();
+    ranked.retain(|r| plant_may_stay(r, &ranked_all, known));
     ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     finding.rivals = rivals(&ranked, known, base);
     let needed = 2.0 * TRIED.ln();
@@ -128,7 +142,7 @@ pub(crate) fn inquire(
     if let Some(best) = best {
         let mut fit = polished(&problem, &best.fit);
         let mut gain = base - fit.criterion(count);
-        if let Some(pair) = pair(&problem, &ranked, known, base, allowed) {
+        if let Some(pair) = pair(&problem, &ranked_all, known, base, allowed) {
             let polished = polished(&problem, &pair);
             gain = gain.max(base - polished.criterion(count));
             fit = polished;
@@ -194,9 +208,22 @@ fn penalty(ranked: &Ranked, known: usize, base: f64, count: usize) -> f64 {
         // A change point is chosen among all samples: it counts about twice (Zhang and Siegmund 2007).
         owed += (count as f64).ln();
     }
-    if effect.definition.id == "extra_mode" {
-        owed += MODE_HANDICAP * (base - ranked.criterion).max(0.0);
+    if effect.definition.parameters.iter().any(|p| p.unit == Unit::Hertz) {
+        // A frequency is chosen among all bins: it counts about twice (Djuric 1996, 3 ln N for a sinusoid).
+        owed += (count as f64).ln();
     }
+    if effect.definition.id == "hysteresis" && pulls(&ranked.fit, known) {
+        owed += UNUSUAL;
+    }
+    let gain = (base - ranked.criterion).max(0.0);
+    owed += match effect.definition.id {
+        "extra_mode" => MODE_HANDICAP * gain,
+        // Nested in a simpler law: it must do better than make up for the imperfection of that law.
+        "stribeck_friction" => LAW_IMPERFECTION * gain,
+        // Hardly to be told from a delay, which every sampled loop has.
+        "actuator_lag" => TIE,
+        _ => 0.0,
+    };
     owed
 }
 
@@ -221,6 +248,7 @@ enum More {
 
 const REFINEMENTS: &[Refinement] = &[
     Refinement { simple: ("coulomb_friction", ""), rich: ("stribeck_friction", ""), more: More::Breakaway },
+    Refinement { simple: ("coulomb_friction", "presliding"), rich: ("coulomb_friction", "bristles"), more: More::Samples(&[0.1, 1.0]) },
     Refinement { simple: ("coulomb_friction", "presliding"), rich: ("stribeck_friction", "presliding"), more: More::Breakaway },
     Refinement { simple: ("input_saturation", ""), rich: ("input_saturation", "soft"), more: More::Numbers(&[4.0, 12.0]) },
     Refinement { simple: ("sensor_saturation", ""), rich: ("sensor_saturation", "soft"), more: More::Numbers(&[4.0, 12.0]) },
@@ -232,12 +260,18 @@ const REFINEMENTS: &[Refinement] = &[
     Refinement { simple: ("actuator_lag", ""), rich: ("actuator_lag", "held"), more: More::Nothing },
 ];
 
+/// Refinements of refinements.
+const FURTHER: &[Refinement] = &[
+    Refinement { simple: ("coulomb_friction", "bristles"), rich: ("stribeck_friction", "bristles"), more: More::Breakaway },
+];
+
 /// Refinements of what is in the running: within this share of the best gain.
 const IN_THE_RUNNING: f64 = 0.25;
 
 /// Richer and other forms of the laws that fit well.
 fn derived(
     problem: &Problem,
+    refinements: &[Refinement],
     ranked: &[Ranked],
     known: usize,
     base: f64,
@@ -249,18 +283,22 @@ fn derived(
     };
     let reach = least + (IN_THE_RUNNING * (base - least)).max(2.0 * TRIED.ln());
     let mut jobs: Vec<(Structure, Vec<f64>, super::noise::Noise)> = Vec::new();
-    for refinement in REFINEMENTS {
+    for refinement in refinements {
         let (Some(simple), Some(rich)) = (
             effects::find(refinement.simple.0, refinement.simple.1),
             effects::find(refinement.rich.0, refinement.rich.1),
         ) else {
             continue;
         };
-        let best = ranked
+        let mut simple_fits: Vec<&Ranked> = ranked
             .iter()
             .filter(|r| std::ptr::eq(r.fit.structure.effects[known].definition, simple))
-            .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
-            .filter(|r| r.criterion <= reach);
+            .collect();
+        simple_fits.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+        let best = match refinement.more {
+            More::Nothing => simple_fits.first().copied(),
+            _ => simple_fits.first().copied().filter(|r| r.criterion <= reach),
+        };
         let Some(best) = best.filter(|_| allowed(rich)) else {
             continue;
         };
@@ -308,6 +346,38 @@ fn speed_scale(problem: &Problem, fit: &Fit, index: usize) -> f64 {
     effects::level(&size(output), 0.8, f64::abs).max(1e-12)
 }
 
+/// Whether force `index` acts against its usual sense.
+fn pulls(fit: &Fit, index: usize) -> bool {
+    let plant = fit.structure.plant(&fit.theta);
+    let rows = Functionals::new(&plant);
+    let signal = rows.of(&plant, fit.structure.effects[index].signal);
+    let direction = fit.structure.direction(&fit.theta, &plant, &rows, index);
+    dot(&signal.rate, &direction) < 0.0
+}
+
+/// An effect fitted beside the given plant stands only while a free plant does not do significantly better with the
+/// same effect: else the effect makes up for wrong parameters (math/explain.md, choice 5).
+fn plant_may_stay(ranked: &Ranked, all: &[Ranked], known: usize) -> bool {
+    if ranked.fit.structure.plant_free {
+        return true;
+    }
+    let effect = &ranked.fit.structure.effects[known];
+    all.iter()
+        .filter(|other| {
+            let theirs = &other.fit.structure.effects[known];
+            other.fit.structure.plant_free
+                && std::ptr::eq(theirs.definition, effect.definition)
+                && theirs.channel == effect.channel
+                && theirs.signal == effect.signal
+                && theirs.direction == effect.direction
+        })
+        .all(|other| {
+            let more = other.fit.free.saturating_sub(ranked.fit.free).max(1);
+            let gained = ranked.fit.deviance - other.fit.deviance;
+            ChiSquared::new(more as f64).map_or(true, |d| d.sf(gained.max(0.0)) > SAME_PLANT)
+        })
+}
+
 /// Physics that contradicts itself is no explanation.
 fn sane(problem: &Problem, fit: &Fit, known: usize) -> bool {
     let plant = fit.structure.plant(&fit.theta);
@@ -315,25 +385,50 @@ fn sane(problem: &Problem, fit: &Fit, known: usize) -> bool {
     (known..fit.structure.effects.len()).all(|index| {
         let effect = &fit.structure.effects[index];
         let shape = fit.structure.shape(&fit.theta, index);
-        if let Action::Force(_, needs, sense) = effect.definition.action {
+        if let Action::Force(_, _, sense) = effect.definition.action {
             let signal = rows.of(&plant, effect.signal);
             let direction = fit.structure.direction(&fit.theta, &plant, &rows, index);
             if sense == Sense::Resists && dot(&signal.rate, &direction) <= 0.0 {
                 return false;
             }
-            let _ = needs;
         }
         let length: f64 = problem.data.segments[0].samples() as f64 * problem.data.sample_time;
         let start = problem.data.segments[0].start_time;
         effect.definition.parameters.iter().zip(&shape).all(|(p, v)| match (p.name, p.unit) {
             // A change needs something before and after it.
             ("from", Unit::Second) => *v > start + 0.02 * length && *v < start + 0.98 * length,
+            ("limit" | "width" | "stop_position", unit) => visited(problem, fit, index, unit, *v),
             ("presliding_distance", _) => *v < 0.5 * travel(problem, fit, index),
             ("breakaway_excess", _) => *v > 0.05,
             ("stribeck_velocity", _) => *v < 1.5 * speed_scale(problem, fit, index),
             _ => true,
         })
     })
+}
+
+/// Whether the motion is on both sides of the threshold `v` often enough for it to be seen.
+fn visited(problem: &Problem, fit: &Fit, index: usize, unit: Unit, v: f64) -> bool {
+    let effect = &fit.structure.effects[index];
+    let two_sided = effect.definition.parameters[0].logarithmic;
+    let values: Vec<f64> = match (unit, effect.signal) {
+        (Unit::Input, _) => problem.data.segments.iter().flat_map(|s| s.inputs[effect.channel].clone()).collect(),
+        (_, Signal::Output(o)) => {
+            // Before the sensor: the motion itself may go beyond what is shown.
+            let mut bare = fit.structure.clone();
+            let mut theta = fit.theta.clone();
+            if matches!(effect.definition.action, Action::Sensor(_)) && bare.effects.len() == index + 1 {
+                theta.truncate(bare.effect_offset(index));
+                bare.effects.truncate(index);
+            }
+            let simulated = bare.simulate(&theta, problem.data).unwrap_or_else(|| fit.simulated.clone());
+            simulated.iter().skip(o).step_by(problem.data.outputs).flatten().copied().collect()
+        }
+        (_, Signal::Difference(i, j)) => fit.simulated[i].iter().zip(&fit.simulated[j]).map(|(a, b)| a - b).collect(),
+        (_, Signal::Integral(_)) => return true,
+    };
+    let beyond = values.iter().filter(|x| if two_sided { x.abs() > v } else { **x > v }).count() as f64;
+    let n = values.len().max(1) as f64;
+    beyond > VISITED * n && beyond < (1.0 - VISITED) * n
 }
 
 /// Half the range of the position that effect `index` looks at, as far as outputs tell.
@@ -388,21 +483,47 @@ fn pair(
     allowed: &(dyn Fn(&Definition) -> bool + Sync),
 ) -> Option<Fit> {
     let count = problem.count();
+    let mut ranked = ranked.to_vec();
+    ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     let best = ranked.first()?;
     let id = |r: &Ranked| r.fit.structure.effects[known].definition.id;
-    let mut firsts = vec![best];
-    firsts.extend(ranked.iter().find(|r| id(r) != id(best)));
+    // The two best effects, each with the plant free and as given: a free plant may hide the second effect.
+    let mut firsts: Vec<&Ranked> = Vec::new();
+    let second = ranked.iter().find(|r| id(r) != id(best));
+    for name in [Some(best), second].into_iter().flatten().map(id) {
+        for free in [true, false] {
+            firsts.extend(ranked.iter().find(|r| id(r) == name && r.fit.structure.plant_free == free));
+        }
+    }
     let single_gain = base - best.criterion;
-    let found = second_effects(problem, &firsts, allowed)
+    let found = second_effects(problem, &firsts, allowed);
+    if std::env::var_os("PAIRS").is_some() {
+        for r in found.iter().take(8) {
+            let v = |f: &Fit| f.residual.iter().flatten().map(|e| e * e).sum::<f64>() / count as f64;
+            eprintln!("pair {:.1} of {single_gain:.1} v1 {:.4e} v2 {:.4e} {:?}", best.criterion - r.criterion, v(&best.fit), v(&r.fit), r.fit.structure.effects[known..].iter().map(|e| (e.definition.id, e.definition.variant)).collect::<Vec<_>>());
+        }
+    }
+    let found = found
         .into_iter()
+        .filter(|r| !look_alikes(r.fit.structure.effects[known].definition.id, r.fit.structure.effects[known + 1].definition.id))
         .filter(|r| sane(problem, &r.fit, known))
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
     let gain = best.criterion - found.fit.criterion(count);
     (gain > SECOND_GAIN.max(SECOND_SHARE * single_gain)).then_some(found.fit)
 }
 
-#[allow(dead_code)]
-fn unused(_: &Needs, _: &Direction) {}
+/// Effects of one kind, of which a recording hardly holds two: misfit of the one would be called the other.
+const KINDS: &[&[&str]] = &[
+    &["coulomb_friction", "stribeck_friction", "hysteresis", "input_backlash"],
+    &["cubic_stiffness", "quadratic_stiffness", "end_stop"],
+    &["input_delay", "actuator_lag", "input_rate_limit"],
+    &["sensor_offset", "sensor_drift", "load_step"],
+    &["gain_change", "stiffness_change"],
+];
+
+fn look_alikes(a: &str, b: &str) -> bool {
+    KINDS.iter().any(|kind| kind.contains(&a) && kind.contains(&b))
+}
 
 /// Used by the search of a second effect.
 pub(crate) fn refit_with(problem: &Problem, structure: Structure, start: Vec<f64>) -> Option<Fit> {

@@ -726,6 +726,10 @@ impl<'a> Bench<'a> {
                 _ => *c,
             };
         }
+        if definition.linear.is_empty() && definition.grows_with_first() {
+            // Twice the width does about twice as much: the coefficient corrects the template's.
+            shape[0] *= coefficients[0].clamp(0.02, 3.0);
+        }
         start.extend(definition.parameters.iter().zip(&shape).map(|(p, v)| {
             if p.logarithmic {
                 v.max(p.lower).ln()

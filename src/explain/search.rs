@@ -13,6 +13,9 @@ const LEADS_EACH: usize = 6;
 /// Places of one effect that are fitted in full from each screening.
 const PLACES_EACH: usize = 2;
 
+/// Scouted fits that are pursued, and forms (places, plant free or not) of one effect among them.
+const PROMISING: usize = 16;
+const FORMS_EACH: usize = 4;
 /// Second effects that are fitted beside each first.
 const SECONDS_EACH: usize = 4;
 
@@ -97,33 +100,58 @@ pub(crate) fn single_effects(
             leads.push((index, lead));
         }
     }
-    let mut ranked: Vec<Ranked> = leads
-        .par_iter()
-        .flat_map_iter(|(index, lead)| {
-            let basis = &bases[*index];
-            let mut fits = Vec::new();
-            let frozen = boring.frozen(count);
-            let (structure, start) = extended(&frozen.structure, &frozen.theta, lead);
-            fits.extend(fit_lead(problem, structure, start, Effort::RANK));
-            // The same with the plant free: from the basis of the lead.
-            let (structure, start) = if *index == 0 {
-                let full = &boring.full.structure;
-                let mut theta = full.given();
-                if frozen.structure.initial_free {
-                    let from = full.coordinates.len();
-                    let states = frozen.structure.states() * frozen.structure.initial.len();
-                    theta[from..from + states].copy_from_slice(&frozen.theta[..states]);
-                }
-                extended(full, &theta, lead)
-            } else {
-                extended(&basis.structure, &basis.theta, lead)
-            };
-            fits.extend(fit_lead(problem, structure, start, Effort::RANK));
-            fits
-        })
+    // Every lead twice: beside the plant as given, and with the plant free. A few steps tell which deserve more.
+    let frozen = boring.frozen(count);
+    let mut jobs: Vec<(Structure, Vec<f64>)> = Vec::new();
+    for (index, lead) in &leads {
+        jobs.push(extended(&frozen.structure, &frozen.theta, lead));
+        jobs.push(if *index == 0 {
+            let full = &boring.full.structure;
+            let mut theta = full.given();
+            if frozen.structure.initial_free {
+                let from = full.coordinates.len();
+                let states = frozen.structure.states() * frozen.structure.initial.len();
+                theta[from..from + states].copy_from_slice(&frozen.theta[..states]);
+            }
+            extended(full, &theta, lead)
+        } else {
+            extended(&boring.full.structure, &boring.full.theta, lead)
+        });
+    }
+    let mut scouted: Vec<Ranked> = jobs
+        .into_par_iter()
+        .filter_map(|(structure, start)| fit_lead(problem, structure, start, Effort::SCOUT))
         .map(|fit| Ranked {
             criterion: fit.criterion(count),
             fit,
+        })
+        .collect();
+    scouted.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let base = boring.best(count).criterion(count);
+    let mut promising: Vec<Ranked> = Vec::new();
+    for r in scouted {
+        let effect = r.fit.structure.effects.last().map(|e| e.definition.id);
+        let forms = promising
+            .iter()
+            .filter(|p| p.fit.structure.effects.last().map(|e| e.definition.id) == effect)
+            .count();
+        if forms < FORMS_EACH && promising.len() < PROMISING {
+            promising.push(r);
+        }
+    }
+    let _ = base;
+    let mut ranked: Vec<Ranked> = promising
+        .into_par_iter()
+        .map(|r| {
+            let noise = r.fit.noise.clone();
+            let better = Fit::run(problem, r.fit.structure.clone(), r.fit.theta.clone(), Some(&noise), Effort::RANK);
+            match better {
+                Some(fit) if fit.deviance < r.fit.deviance => Ranked {
+                    criterion: fit.criterion(count),
+                    fit,
+                },
+                _ => r,
+            }
         })
         .collect();
     ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));

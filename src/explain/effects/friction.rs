@@ -44,6 +44,24 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: short_distances,
     },
     Definition {
+        id: "coulomb_friction",
+        variant: "bristles",
+        name: "Coulomb friction with bristles",
+        equation: "F = -Fc (z + tz dz/dt), dz/dt = v/zs (1 - z sign(v))",
+        parameters: &[
+            Parameter::positive("presliding_distance", Unit::Position),
+            Parameter::positive("bristle_damping_time", Unit::Second),
+        ],
+        mimics: &[Mimic {
+            effect: "hysteresis",
+            experiment: "a slow triangle at several amplitudes: the elastic part of dry friction is short",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Force(damped_bristle, Needs::Position, Sense::Resists),
+        starts: |_| Vec::new(),
+    },
+    Definition {
         id: "stribeck_friction",
         variant: "",
         name: "friction with breakaway (Stribeck)",
@@ -89,6 +107,30 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: |_| Vec::new(),
     },
     Definition {
+        id: "stribeck_friction",
+        variant: "bristles",
+        name: "friction with breakaway (Stribeck) and bristles",
+        equation: "F = -Fc (1 + b exp(-(v/vs)^2)) (z + tz dz/dt), dz/dt = v/zs (1 - z sign(v))",
+        parameters: &[
+            Parameter::positive("presliding_distance", Unit::Position),
+            Parameter::positive("bristle_damping_time", Unit::Second),
+            Parameter {
+                lower: 0.02,
+                upper: 20.0,
+                ..Parameter::positive("breakaway_excess", Unit::Ratio)
+            },
+            Parameter::positive("stribeck_velocity", Unit::Rate),
+        ],
+        mimics: &[Mimic {
+            effect: "coulomb_friction",
+            experiment: "slow constant velocities from standstill upwards: only Stribeck friction falls as the speed rises",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Force(damped_breakaway_bristle, Needs::Position, Sense::Resists),
+        starts: |_| Vec::new(),
+    },
+    Definition {
         id: "quadratic_drag",
         variant: "",
         name: "quadratic drag",
@@ -113,45 +155,72 @@ fn coulomb(_: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
     motion.stopping_force(1.0)
 }
 
-/// Dahl's law, exact for the distance moved, at the position in the middle of the interval that it brings about
-/// itself (one secant step: stiff bristles would be unstable otherwise). Memory: deflection of the bristles in units
-/// of their largest, and the position it was last updated at.
+/// Dahl's law ([`bristle_force`] without damping).
 fn bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 2]) -> f64 {
-    bristle_of_strength(1.0, p, motion, memory)
+    bristle_force(1.0, p[0], 0.0, motion, memory)
 }
 
-fn bristle_of_strength(strength: f64, p: &[f64], motion: &Motion, memory: &mut [f64; 2]) -> f64 {
+/// Bristles with damping of their own: LuGre friction (Canudas de Wit et al. 1995) of constant strength.
+fn damped_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 2]) -> f64 {
+    bristle_force(1.0, p[0], p[1], motion, memory)
+}
+
+/// [`bristle`] whose strength falls with the speed.
+fn breakaway_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 2]) -> f64 {
+    let slow = motion.middle_rate() / p[2];
+    bristle_force(1.0 + p[1] * (-slow * slow).exp(), p[0], 0.0, motion, memory)
+}
+
+/// LuGre friction.
+fn damped_breakaway_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 2]) -> f64 {
+    let slow = motion.middle_rate() / p[3];
+    bristle_force(1.0 + p[2] * (-slow * slow).exp(), p[0], p[1], motion, memory)
+}
+
+/// Mean force over the interval of bristles that yield over `distance` and are damped over `time`.
+///
+/// The deflection follows the position exactly (its law integrates in closed form over a monotone move), at the
+/// position in the middle of the interval that the force brings about itself: stiff bristles would be unstable
+/// otherwise. Memory: deflection in units of the largest, and the position it was last updated at.
+fn bristle_force(strength: f64, distance: f64, time: f64, motion: &Motion, memory: &mut [f64; 2]) -> f64 {
     if motion.sample == 0 {
         memory[1] = motion.position;
     }
+    let (before, from) = (memory[0], memory[1]);
     let free = motion.middle();
     let deflected = |at: f64| {
-        let moved = at - memory[1];
+        let moved = at - from;
         let side = moved.signum();
-        side - (side - memory[0]) * (-moved.abs() / p[0]).exp()
+        side - (side - before) * (-moved.abs() / distance).exp()
     };
-    // z -> deflection at the position that -z brings about; its fixed point is sought.
-    let half_gain = 0.5 * motion.position_gain * strength;
-    let z0 = deflected(free);
-    let z1 = deflected(free - half_gain * z0);
-    let slope = z0 - z1;
-    // With f(0) = z0 and f(z0) = z1 the secant's fixed point is z0^2/(z0 + z0 - z1).
-    let denominator = z0 + slope;
-    let z = if denominator.abs() > 1e-12 && (z0 * z0 / denominator).abs() <= 1.0 {
-        z0 * z0 / denominator
-    } else {
-        z1
+    let damping = time / motion.clock.step;
+    let force = |at: f64| {
+        let z = deflected(at);
+        z + damping * (z - before)
     };
-    let at = free - half_gain * z;
-    memory[0] = deflected(at).clamp(-1.0, 1.0);
-    memory[1] = at;
-    -strength * z.clamp(-1.0, 1.0)
-}
-
-/// [`bristle`] whose strength falls with the speed: LuGre friction without its micro-damping.
-fn breakaway_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 2]) -> f64 {
-    let slow = motion.middle_rate() / p[2];
-    bristle_of_strength(1.0 + p[1] * (-slow * slow).exp(), p, motion, memory)
+    // force(free - gain f) - f falls with f: its root lies between 0 and force(free), and bisection by the secant
+    // (Illinois) finds it in a few steps.
+    let gain = (0.5 * motion.position_gain * strength).max(0.0);
+    let excess = |f: f64| force(free - gain * f) - f;
+    let (mut a, mut b) = (0.0, force(free));
+    let (mut at_a, mut at_b) = (b, excess(b));
+    let mut f = b;
+    for _ in 0..6 {
+        if (b - a).abs() < 1e-6 || at_a == at_b {
+            break;
+        }
+        f = b - at_b * (b - a) / (at_b - at_a);
+        let at_f = excess(f);
+        if at_f * at_b < 0.0 {
+            (a, at_a) = (b, at_b);
+        } else {
+            at_a *= 0.5;
+        }
+        (b, at_b) = (f, at_f);
+    }
+    let at = free - gain * f;
+    *memory = [deflected(at).clamp(-1.0, 1.0), at];
+    -strength * f
 }
 
 fn stribeck(p: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {

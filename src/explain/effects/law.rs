@@ -60,7 +60,7 @@ impl Motion {
     /// Force in `[-limit, limit]` that brings the rate at the end of the interval to rest, or as near as it can: the
     /// implicit step of Moreau and Jean, which sticks without smoothing or chatter.
     pub fn stopping_force(&self, limit: f64) -> f64 {
-        if self.rate_gain > 0.0 {
+        if self.rate_gain > 0.0 && limit >= 0.0 {
             (-self.rate_free / self.rate_gain).clamp(-limit, limit)
         } else {
             -limit * self.rate.signum()

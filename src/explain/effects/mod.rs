@@ -194,6 +194,13 @@ pub struct Definition {
 }
 
 impl Definition {
+    /// Whether what the effect does grows about in proportion to its first parameter, from nothing at zero.
+    pub(crate) fn grows_with_first(&self) -> bool {
+        self.parameters
+            .first()
+            .is_some_and(|p| matches!(p.name, "delay" | "time_constant" | "width" | "half_gap"))
+    }
+
     /// Where the effect acts.
     pub fn port(&self) -> Port {
         match self.action {
