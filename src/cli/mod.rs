@@ -7,6 +7,7 @@
 
 mod completions;
 mod deviations;
+mod explain;
 mod identify;
 mod numbers;
 mod output;
@@ -34,10 +35,11 @@ const ABOUT: &str =
 const EXAMPLE: &str = "Example:
   innovant identify log.csv --output model.json    columns u* are inputs, y* outputs, t is time
   innovant validate model.json fresh.csv           does the model hold on another recording?
+  innovant explain log.csv --simulation sim.csv    what did the simulation leave out?
   innovant simulate model.json input.csv > out.csv
   innovant show model.json
 
-Exit codes: 0 done; 1 the model was rejected; 2 an error.";
+Exit codes: 0 done; 1 the model or simulation was rejected; 2 an error.";
 
 #[derive(Debug, Parser)]
 #[command(name = "innovant", version, about = ABOUT, after_help = EXAMPLE, max_term_width = 100)]
@@ -62,6 +64,7 @@ struct Verbosity {
 #[derive(Debug, Subcommand)]
 enum Command {
     Identify(identify::Flags),
+    Explain(explain::Flags),
     Validate(validate::Flags),
     Simulate(simulate::Flags),
     Show(show::Flags),
@@ -110,6 +113,7 @@ fn dispatch(cli: Cli) -> anyhow::Result<Outcome> {
             Ok(Outcome::Done)
         }
         Some(Command::Identify(flags)) => identify::run(flags, say),
+        Some(Command::Explain(flags)) => explain::run(flags, say),
         Some(Command::Validate(flags)) => validate::run(flags, say),
         Some(Command::Simulate(flags)) => simulate::run(flags, say),
         Some(Command::Show(flags)) => show::run(flags),

@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 
 use super::Outcome;
 use super::output::print;
-use crate::report::model_schema;
+use crate::report::{explanation_schema, model_schema};
 
 const EXAMPLE: &str = "Example:
   innovant schema model > innovant-model-1.schema.json";
@@ -21,11 +21,14 @@ pub(super) struct Flags {
 enum Document {
     /// innovant-model/1, what `innovant identify --output` writes
     Model,
+    /// innovant-explanation/1, what `innovant explain --output` writes
+    Explanation,
 }
 
 pub(super) fn run(flags: &Flags) -> anyhow::Result<Outcome> {
     match flags.document {
         Document::Model => print(&model_schema()?)?,
+        Document::Explanation => print(&explanation_schema()?)?,
     }
     Ok(Outcome::Done)
 }

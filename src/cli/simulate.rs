@@ -1,6 +1,6 @@
 //! `innovant simulate`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use nalgebra::DVector;
@@ -9,10 +9,11 @@ use super::output::{Output, check_distinct, note, paths};
 use super::roles::RoleFlags;
 use super::validate::check_sampling;
 use super::{Outcome, Verbosity};
-use crate::identify::Model;
+use crate::explain::Explanation;
+use crate::identify::{IdentifiedChannel, Model};
 use crate::linalg::spectral_radius;
-use crate::log::{Channel, Log, RoleNeed, Source, write_table};
-use crate::report::read_model;
+use crate::log::{Channel, Log, RoleNeed, Roles, Source, check_same_sampling, write_table};
+use crate::report::{is_explanation, parse_explanation, read_model};
 
 const EXAMPLE: &str = "Examples:
   innovant simulate model.json input.csv > output.csv
@@ -25,7 +26,8 @@ const EXAMPLE: &str = "Examples:
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(super) struct Flags {
-    /// Model, as `innovant identify --output` writes it, or {"A":..,"B":..,"C":..,"dt":..}
+    /// Model, as `innovant identify --output` or `innovant explain --output` writes it, or
+    /// {"A":..,"B":..,"C":..,"dt":..}
     #[arg(value_name = "MODEL")]
     model: PathBuf,
     /// Input: CSV, also gzipped; `-` is standard input
@@ -37,6 +39,9 @@ pub(super) struct Flags {
     /// best, which the input file must then hold too
     #[arg(long, value_enum, default_value = "zero")]
     initial_state: InitialState,
+    /// Answer of the original simulator to this input, for an explanation relative to a simulator that is not linear
+    #[arg(long, value_name = "FILE")]
+    simulation: Option<PathBuf>,
     /// Write the outputs to this file, as CSV; `-` is standard output
     #[arg(short, long, value_name = "FILE", default_value = "-")]
     output: PathBuf,
@@ -49,10 +54,17 @@ enum InitialState {
 }
 
 pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
-    let sources = [flags.input.clone(), Source::from(flags.model.clone())];
+    let mut sources = vec![flags.input.clone(), Source::from(flags.model.clone())];
+    sources.extend(flags.simulation.iter().cloned().map(Source::from));
     check_distinct(&sources)?;
     let output = Output::check(&flags.output, &paths(&sources))?;
     let name = flags.model.display().to_string();
+    if let Some(explanation) = explanation(&flags.model)? {
+        return simulate_explanation(flags, &output, &explanation);
+    }
+    if flags.simulation.is_some() {
+        anyhow::bail!("{name}: --simulation belongs to an explanation, and this is a model; leave it out");
+    }
     let model = read_model(&flags.model)?.model;
     if model.inputs.is_empty() {
         anyhow::bail!("{name}: this model has no inputs, so there is nothing to simulate");
@@ -101,6 +113,80 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         .zip(outputs.iter().map(Vec::as_slice))
         .collect();
     write_table(output.path(), log.sample_time, log.start_time, &columns)?;
+    Ok(Outcome::Done)
+}
+
+/// The explanation in `path`, if that is one; `-` and unreadable files are left to the reader of models.
+fn explanation(path: &Path) -> anyhow::Result<Option<Explanation>> {
+    match std::fs::read_to_string(path) {
+        Ok(text) if is_explanation(&text) => Ok(Some(parse_explanation(&path.display().to_string(), &text)?)),
+        _ => Ok(None),
+    }
+}
+
+fn simulate_explanation(flags: Flags, output: &Output, explanation: &Explanation) -> anyhow::Result<Outcome> {
+    let model = &explanation.model;
+    let name = flags.model.display().to_string();
+    let channel = |c: &Channel| IdentifiedChannel {
+        channel: c.clone(),
+        level: 0.0,
+        delay: 0,
+    };
+    let inputs: Vec<IdentifiedChannel> = model.inputs.iter().map(channel).collect();
+    let outputs: Vec<IdentifiedChannel> = model.outputs.iter().map(channel).collect();
+    let roles = flags.roles.of_model(&inputs, &outputs)?;
+    let estimate = flags.initial_state == InitialState::Estimate;
+    let need = if estimate {
+        RoleNeed::InputsAndMaybeOutputs
+    } else {
+        RoleNeed::InputsOnly
+    };
+    let log = Log::read_with(&flags.input, &roles, need)?;
+    check_same_sampling(&name, model.sample_time, &log.name, log.sample_time)?;
+    let columns: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
+    let start = if estimate {
+        if log.output_data.len() != model.outputs.len() {
+            anyhow::bail!(
+                "{}: --initial-state estimate needs the recorded outputs in this file; name them with --outputs, or start \
+                 from --initial-state zero",
+                log.name
+            );
+        }
+        let recorded: Vec<&[f64]> = log.output_data.iter().map(Vec::as_slice).collect();
+        Some(model.estimate_initial_state(&columns, &recorded)?)
+    } else {
+        None
+    };
+    let simulated = match &flags.simulation {
+        Some(file) => {
+            let named = Roles {
+                outputs: Some(model.outputs.iter().map(|c| c.name.clone()).collect()),
+                sample_time: roles.sample_time,
+                ..Roles::default()
+            };
+            Some(Log::read_with(&Source::from(file.clone()), &named, RoleNeed::OutputsOnly)?)
+        }
+        None => None,
+    };
+    if let Some(simulated) = &simulated
+        && simulated.samples() != log.samples()
+    {
+        anyhow::bail!(
+            "{}: {} samples, and {} has {}; simulate exactly this input",
+            simulated.name,
+            simulated.samples(),
+            log.name,
+            log.samples()
+        );
+    }
+    let correction: Option<Vec<&[f64]>> = simulated
+        .as_ref()
+        .map(|s| s.output_data.iter().map(Vec::as_slice).collect());
+    let outputs = model
+        .simulate(&columns, start.as_deref(), correction.as_deref())
+        .map_err(|error| anyhow::anyhow!("{name}: {error}"))?;
+    let table: Vec<(&Channel, &[f64])> = model.outputs.iter().zip(outputs.iter().map(Vec::as_slice)).collect();
+    write_table(output.path(), log.sample_time, log.start_time, &table)?;
     Ok(Outcome::Done)
 }
 

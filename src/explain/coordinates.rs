@@ -23,8 +23,6 @@ pub(crate) struct Coordinates {
     pub free_rows: Vec<usize>,
     /// Inputs whose column of `B` is free: those that the given plant responds to.
     pub active_inputs: Vec<usize>,
-    /// Chain length of each output: its rows follow one another.
-    pub chains: Vec<Vec<usize>>,
     /// Takes the given state to these coordinates: `x_here = to_here * x_given`.
     pub to_here: DMatrix<f64>,
 }
@@ -77,7 +75,7 @@ impl Coordinates {
             given,
             free_rows,
             active_inputs,
-            chains,
+
             to_here: t,
         }
     }

@@ -27,6 +27,8 @@ pub(crate) struct Data {
     pub sample_time: f64,
     pub inputs: usize,
     pub outputs: usize,
+    /// The last input is the constant 1, through which operating points enter.
+    pub constant: bool,
 }
 
 /// A column a segment and output (`segment * outputs + output`): residuals, simulated outputs, weights.
@@ -36,6 +38,11 @@ impl Data {
     /// Samples over all segments (a sample holds all channels).
     pub fn samples(&self) -> usize {
         self.segments.iter().map(Segment::samples).sum()
+    }
+
+    /// Inputs that are signals: all but the constant.
+    pub fn signals(&self) -> usize {
+        self.inputs - usize::from(self.constant)
     }
 
     /// Measured outputs minus `simulated`.

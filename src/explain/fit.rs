@@ -68,7 +68,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Root mean square of a simulated change, in standard deviations of the outputs.
-    fn size(&self, a: &Series, b: &Series) -> f64 {
+    pub fn size(&self, a: &Series, b: &Series) -> f64 {
         let (mut sum, mut n) = (0.0, 0usize);
         for (s, (a, b)) in a.iter().zip(b).enumerate() {
             let scale = self.scale[s % self.scale.len()];

@@ -6,6 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::adequacy::{Adequacy, adequacy};
 use super::data::Data;
 use super::effects::{self, Action, Definition, Sense, Unit};
+use super::explanation::Verdict;
 use super::exact::{Freeze, frozen, spacing};
 use super::fit::{Effort, Fit, Problem};
 use super::search::{Boring, Ranked, fit_lead, second_effects, single_effects};
@@ -14,8 +15,10 @@ use super::structure::{Functionals, Signal, Structure, dot};
 /// Places, laws and starting values that are tried on one recording, about: a name among so many needs
 /// `2 ln(300)` more than nothing at all (the maximum of that many chi-squares with one degree of freedom).
 const TRIED: f64 = 300.0;
+/// `2 ln(TRIED)`.
+pub(crate) const NEEDED: f64 = 11.4;
 /// Names whose criteria differ by less explain the recording equally well (Kass and Raftery 1995: 6 is "strong").
-const TIE: f64 = 6.0;
+const TIE: f64 = super::explanation::EFFECTS_TIE;
 /// A missing resonance imitates any linear misfit; it must lead by this share of its gain.
 const MODE_HANDICAP: f64 = 0.01;
 /// What an answer owes that physics allows but that is rare, such as a hysteresis that gives energy back: odds of 1
@@ -34,21 +37,6 @@ const SECOND_SHARE: f64 = 0.1;
 const SECOND_GAIN: f64 = 30.0;
 /// Share of the innovation variance that rounding to levels must make up to be named.
 const COARSE: f64 = 0.25;
-
-/// The answer's kind.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Verdict {
-    /// No difference beyond noise.
-    Consistent,
-    /// Same physics, other parameters or another initial state.
-    Parameters,
-    /// The missing physics has a name.
-    Named,
-    /// Two or more kinds explain it equally well.
-    Family,
-    /// Something is missing that nothing in the library explains.
-    Unexplained,
-}
 
 /// A rival of the answer.
 #[derive(Debug, Clone)]
@@ -76,6 +64,8 @@ pub(crate) struct Finding {
     pub coarse: Option<(usize, f64)>,
     pub adequacy: Option<Adequacy>,
     pub count: usize,
+    /// What effects that were not found would have had to be: size in the output over its standard deviation.
+    pub detectable: Vec<(&'static Definition, super::structure::Instance, f64)>,
 }
 
 /// Runs the whole inquiry. `structure` is the simulation as it is known.
@@ -116,6 +106,7 @@ pub(crate) fn inquire(
         coarse: coarse.map(|(output, step, _)| (output, step)),
         adequacy: None,
         count,
+        detectable: Vec::new(),
     };
     let dominated = coarse.is_some_and(|(_, _, share)| share > 0.5);
     if dominated || coarse.is_some_and(|c| c.2 > 0.3) {
@@ -137,7 +128,8 @@ pub(crate) fn inquire(
     ranked.retain(|r| plant_may_stay(r, &ranked_all, known));
     ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     finding.rivals = rivals(&ranked, known, base);
-    let needed = 2.0 * TRIED.ln();
+    finding.detectable = detectable(&problem, &ranked, known);
+    let needed = NEEDED;
     let best = ranked.first().filter(|r| base - r.criterion > needed);
     if let Some(best) = best {
         let mut fit = polished(&problem, &best.fit);
@@ -281,7 +273,7 @@ fn derived(
     let Some(least) = ranked.iter().map(|r| r.criterion).reduce(f64::min) else {
         return Vec::new();
     };
-    let reach = least + (IN_THE_RUNNING * (base - least)).max(2.0 * TRIED.ln());
+    let reach = least + (IN_THE_RUNNING * (base - least)).max(NEEDED);
     let mut jobs: Vec<(Structure, Vec<f64>, super::noise::Noise)> = Vec::new();
     for refinement in refinements {
         let (Some(simple), Some(rich)) = (
@@ -450,6 +442,32 @@ fn travel(problem: &Problem, fit: &Fit, index: usize) -> f64 {
             of(&path)
         }
     }
+}
+
+/// For each effect that was fitted: the size in the output at which its evidence would have sufficed. The evidence
+/// grows with the square of the size, and the fit's own size has an evidence of its deviance.
+fn detectable(problem: &Problem, ranked: &[Ranked], known: usize) -> Vec<(&'static Definition, super::structure::Instance, f64)> {
+    let mut list: Vec<(&'static Definition, super::structure::Instance, f64)> = Vec::new();
+    for r in ranked {
+        let instance = r.fit.structure.effects[known];
+        if list.iter().any(|l| l.0.id == instance.definition.id) {
+            continue;
+        }
+        // The same numbers without the effect.
+        let mut without = r.fit.structure.clone();
+        let theta = r.fit.theta[..without.effect_offset(known)].to_vec();
+        without.effects.truncate(known);
+        let Some(simulated) = without.simulate(&theta, problem.data) else {
+            continue;
+        };
+        let change = problem.size(&simulated, &r.fit.simulated);
+        let lost = r.fit.noise.deviance(&problem.data.residual(&simulated), &problem.mask) - r.fit.deviance;
+        let owed = NEEDED + (r.fit.structure.len() - theta.len()) as f64 * (problem.count() as f64).ln();
+        if lost > 0.1 && change > 0.0 {
+            list.push((instance.definition, instance, change * (owed / lost).sqrt()));
+        }
+    }
+    list
 }
 
 /// One line an effect: the best of its forms.

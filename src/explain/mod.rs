@@ -1,17 +1,56 @@
 //! What did the simulation leave out?
+//!
+//! A recording and a simulation of it differ. [`explain`] tells whether by more than noise, where, what physics is
+//! missing, how sure that is, and returns the simulation with that physics in it:
+//!
+//! ```text
+//! recording ──┐                        ┌── boring: initial state, parameters ──┐
+//!             ├─ simulation known as ──┤                                        ├── rank ── decide ── prove ── say
+//! simulation ─┘  plant + known effects └── screen ── fit effects, singly, pairs ┘
+//! ```
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `simulation`, `baseline` | the simulation as a model, also from a column of its outputs |
+//! | `coordinates`, `plant`, `structure`, `run` | the augmented model: numbers, effects, the recursion |
+//! | `effects` | the library, one file a family |
+//! | `noise`, `fit` | coloured, heavy-tailed noise; Levenberg and Marquardt |
+//! | `screen`, `search`, `inquiry` | which effects deserve a fit, the fits, the decision |
+//! | `exact`, `adequacy` | tests without fits, and of what is left |
+//! | `locate`, `curve`, `prove`, `probability` | where, the law without a form, held-out blocks, how sure |
+//! | `answer`, `words`, `explanation`, `augmented` | what is said, and the model that can be run |
+
 mod adequacy;
+mod answer;
+mod augmented;
 mod baseline;
 mod coordinates;
+mod curve;
 mod data;
 pub mod effects;
-mod engine;
+mod error;
 mod exact;
+mod explanation;
 mod fit;
 mod inquiry;
+mod locate;
 mod noise;
 mod plant;
+mod probability;
+mod prove;
 mod run;
 mod screen;
 mod search;
+mod simulation;
 mod structure;
-pub use engine::{Simulation, scratch};
+mod words;
+
+pub use answer::{Options, explain};
+pub use augmented::AugmentedError;
+pub use error::ExplainError;
+pub use explanation::{
+    Alternative, AugmentedModel, Curve, Detectable, EXPLANATION_FORMAT, EffectFound, EffectSize, Evidence, Explanation,
+    FitFigure, FitSteps, FitTable, Location, ModelEffect, NoiseFound, ParameterChange, Quantity, Regime, Remaining,
+    SignalReference, SignalTraces, Verdict,
+};
+pub use simulation::Simulation;

@@ -57,10 +57,10 @@ struct Template {
 }
 
 /// Signals of the basis: per segment.
-struct Signals {
-    instance_signal: Signal,
-    position: Vec<Vec<f64>>,
-    rate: Vec<Vec<f64>>,
+pub(crate) struct Signals {
+    pub instance_signal: Signal,
+    pub position: Vec<Vec<f64>>,
+    pub rate: Vec<Vec<f64>>,
 }
 
 /// Screens the library (entries that `allowed` lets pass) around `basis` under `noise`; best first.
@@ -188,7 +188,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Positions and rates that forces may look at, from the motion of the basis.
-    fn signals(&self) -> Vec<Signals> {
+    pub fn signals(&self) -> Vec<Signals> {
         let l = self.plant.outputs;
         let rows = Functionals::new(&self.plant);
         let mut places: Vec<Signal> = (0..l).map(Signal::Output).collect();
@@ -272,7 +272,7 @@ impl<'a> Bench<'a> {
 
     fn templates(&self, definition: &'static Definition, signals: &[Signals], lines: &[f64]) -> Vec<Template> {
         match definition.action {
-            Action::Input(_) => (0..self.data().inputs)
+            Action::Input(_) => (0..self.data().signals())
                 .filter(|j| self.basis.structure.coordinates.active_inputs.contains(j))
                 .flat_map(|j| self.input_templates(definition, j))
                 .collect(),
@@ -280,11 +280,11 @@ impl<'a> Bench<'a> {
                 .flat_map(|o| self.sensor_templates(definition, o, lines))
                 .collect(),
             Action::Force(_, needs, _) => self.force_templates(definition, needs, signals),
-            Action::Mode => (0..self.data().inputs)
+            Action::Mode => (0..self.data().signals())
                 .filter(|j| self.basis.structure.coordinates.active_inputs.contains(j))
                 .flat_map(|j| self.mode_templates(definition, j))
                 .collect(),
-            Action::MissingPath => (0..self.data().inputs)
+            Action::MissingPath => (0..self.data().signals())
                 .filter(|j| !self.basis.structure.coordinates.active_inputs.contains(j))
                 .map(|j| Template {
                     instance: Instance {
@@ -570,7 +570,7 @@ impl<'a> Bench<'a> {
                 .map(|(s, segment)| (0..segment.samples()).map(|k| f(s, k)).collect())
                 .collect()
         };
-        for &input in &self.basis.structure.coordinates.active_inputs {
+        for &input in self.basis.structure.coordinates.active_inputs.iter().filter(|j| **j < self.problem.data.signals()) {
             let b = self.plant.b_column(input);
             let mut drives: Vec<Vec<Vec<f64>>> = Vec::new();
             let u = |s: usize, k: usize| data.segments[s].inputs[input][k];
@@ -656,6 +656,53 @@ impl<'a> Bench<'a> {
         Some((gained, self.left, kept))
     }
 
+    /// A static law of `values` through input `drive`: hats at `knots`, `(gain, coefficients, covariance)`.
+    pub fn static_law(
+        &self,
+        drive: usize,
+        values: &[Vec<f64>],
+        knots: &[f64],
+    ) -> Option<(f64, DVector<f64>, DMatrix<f64>)> {
+        let b = self.plant.b_column(drive);
+        let m = knots.len();
+        let columns: Vec<Vec<f64>> = (0..m)
+            .map(|i| {
+                let low = if i == 0 { f64::NEG_INFINITY } else { knots[i - 1] };
+                let high = if i + 1 == m { f64::INFINITY } else { knots[i + 1] };
+                let force: Vec<Vec<f64>> = values
+                    .iter()
+                    .map(|v| {
+                        v.iter()
+                            .map(|v| {
+                                if (i == 0 && *v <= knots[0]) || (i + 1 == m && *v >= knots[m - 1]) {
+                                    1.0
+                                } else {
+                                    hat(*v, low.max(knots[0] - 1.0), knots[i], high.min(knots[m - 1] + 1.0))
+                                }
+                            })
+                            .collect()
+                    })
+                    .collect();
+                self.flatten(&self.response(&b, &force))
+            })
+            .collect();
+        let rows = self.weights.len();
+        let raw = DMatrix::from_vec(rows, m, columns.concat());
+        let scale = raw.column_iter().map(|c| c.norm_squared()).fold(0.0, f64::max);
+        let columns = self.projected(&raw);
+        let mut gram = multiply_tn(&columns, &columns);
+        // A ridge far below what the data determine: the straight line belongs to the plant.
+        for i in 0..m {
+            gram[(i, i)] += 1e-7 * scale;
+        }
+        let inner = columns.tr_mul(&self.residual);
+        let inverse = gram.cholesky()?.inverse();
+        let coefficients = &inverse * &inner;
+        let gain = coefficients.dot(&inner);
+        let variance = (self.left - gain).max(0.0) / (rows as f64 - m as f64).max(1.0);
+        gain.is_finite().then(|| (gain, coefficients, inverse * variance))
+    }
+
     /// What a template gains, with starting values; a force also matched with each input.
     fn judge(&self, template: &Template) -> Vec<Lead> {
         let rows = self.weights.len();
@@ -673,7 +720,7 @@ impl<'a> Bench<'a> {
         let Action::Force(..) = template.instance.definition.action else {
             return leads;
         };
-        for &input in &self.basis.structure.coordinates.active_inputs {
+        for &input in self.basis.structure.coordinates.active_inputs.iter().filter(|j| **j < self.problem.data.signals()) {
             let b = DVector::from_vec(self.plant.b_column(input));
             let square = (b.transpose() * &gram * &b)[(0, 0)];
             let along = b.dot(&inner);

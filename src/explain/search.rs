@@ -13,6 +13,8 @@ const LEADS_EACH: usize = 6;
 /// Places of one effect that are fitted in full from each screening.
 const PLACES_EACH: usize = 2;
 
+/// What a feedthrough must gain to be believed: strong evidence (Kass and Raftery 1995).
+const FEEDTHROUGH_GAIN: f64 = 10.0;
 /// Scouted fits that are pursued, and forms (places, plant free or not) of one effect among them.
 const PROMISING: usize = 16;
 const FORMS_EACH: usize = 4;
@@ -45,7 +47,27 @@ impl Boring {
         Some(Self {
             given: fit(structure(false, false))?,
             initial: fit(structure(false, true))?,
-            full: fit(structure(true, true))?,
+            full: {
+                let plain = fit(structure(true, true))?;
+                let count = problem.count();
+                let with_feedthrough = Structure {
+                    feedthrough_free: true,
+                    ..structure(true, true)
+                };
+                let start = {
+                    let mut theta = plain.theta.clone();
+                    let given = &with_feedthrough.coordinates.given;
+                    let at = plain.structure.linear_len();
+                    let column = |input: usize| (0..given.outputs).map(move |o| given.d[o * given.inputs + input]);
+                    let d: Vec<f64> = with_feedthrough.coordinates.active_inputs.iter().flat_map(|j| column(*j)).collect();
+                    theta.splice(at..at, d);
+                    theta
+                };
+                match Fit::run(problem, with_feedthrough, start, Some(&plain.noise), Effort::FINAL) {
+                    Some(direct) if direct.criterion(count) < plain.criterion(count) - FEEDTHROUGH_GAIN => direct,
+                    _ => plain,
+                }
+            },
         })
     }
 
@@ -127,7 +149,6 @@ pub(crate) fn single_effects(
         })
         .collect();
     scouted.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
-    let base = boring.best(count).criterion(count);
     let mut promising: Vec<Ranked> = Vec::new();
     for r in scouted {
         let effect = r.fit.structure.effects.last().map(|e| e.definition.id);
@@ -139,7 +160,6 @@ pub(crate) fn single_effects(
             promising.push(r);
         }
     }
-    let _ = base;
     let mut ranked: Vec<Ranked> = promising
         .into_par_iter()
         .map(|r| {

@@ -80,8 +80,8 @@ pub(crate) struct Structure {
     pub initial_free: bool,
     /// Initial state of each segment while it is not free.
     pub initial: Vec<Vec<f64>>,
-    /// The levels of the outputs are free (the simulation has operating points); else zero.
-    pub levels_free: bool,
+    /// The direct feedthrough is free (it then is of the plant's numbers, so the plant must be free too).
+    pub feedthrough_free: bool,
     /// All effects; the first `known.len()` of them are in the simulation already.
     pub effects: Vec<Instance>,
     /// Numbers of the effects that the simulation knows; they are free when the plant is.
@@ -101,7 +101,16 @@ impl Structure {
     pub fn linear_len(&self) -> usize {
         (if self.plant_free { self.coordinates.len() } else { 0 })
             + (if self.initial_free { self.states() * self.initial.len() } else { 0 })
-            + (if self.levels_free { self.outputs() } else { 0 })
+            + self.feedthrough_len()
+    }
+
+    /// Numbers of `D` that are free: those of the active inputs.
+    fn feedthrough_len(&self) -> usize {
+        if self.plant_free && self.feedthrough_free {
+            self.outputs() * self.coordinates.active_inputs.len()
+        } else {
+            0
+        }
     }
 
     /// Effects whose numbers are in the parameter vector.
@@ -149,8 +158,11 @@ impl Structure {
         if self.initial_free {
             theta.extend(self.initial.iter().flatten());
         }
-        if self.levels_free {
-            theta.extend(std::iter::repeat_n(0.0, self.outputs()));
+        if self.feedthrough_len() > 0 {
+            let given = &self.coordinates.given;
+            for &input in &self.coordinates.active_inputs {
+                theta.extend((0..given.outputs).map(|o| given.d[o * given.inputs + input]));
+            }
         }
         theta
     }
@@ -183,7 +195,18 @@ impl Structure {
     /// The plant that these numbers stand for.
     pub fn plant(&self, theta: &[f64]) -> Plant {
         if self.plant_free {
-            self.coordinates.plant(&theta[..self.coordinates.len()])
+            let mut plant = self.coordinates.plant(&theta[..self.coordinates.len()]);
+            let count = self.feedthrough_len();
+            if count > 0 {
+                let l = plant.outputs;
+                let numbers = &theta[self.linear_len() - count..];
+                for (&input, column) in self.coordinates.active_inputs.iter().zip(numbers.chunks_exact(l)) {
+                    for (o, d) in column.iter().enumerate() {
+                        plant.d[o * plant.inputs + input] = *d;
+                    }
+                }
+            }
+            plant
         } else {
             self.coordinates.given.clone()
         }
@@ -197,16 +220,6 @@ impl Structure {
             &theta[from..from + n]
         } else {
             &self.initial[index]
-        }
-    }
-
-    /// Level of each output.
-    pub fn levels(&self, theta: &[f64]) -> Vec<f64> {
-        let l = self.outputs();
-        if self.levels_free {
-            theta[self.linear_len() - l..self.linear_len()].to_vec()
-        } else {
-            vec![0.0; l]
         }
     }
 
@@ -290,7 +303,7 @@ impl Structure {
                 rate_gain,
                 input: match effect.direction {
                     Direction::Matched(input) => input,
-                    Direction::Free => 0,
+                    Direction::Free => effect.channel,
                 },
             });
         }
@@ -344,13 +357,6 @@ impl Structure {
             if matches!(effect.definition.action, Action::Mode) {
                 let residues = &self.effect_numbers(theta, index)[effect.definition.parameters.len()..];
                 add_mode(&self.shape(theta, index), residues, &inputs[effect.channel], clock, &mut outputs);
-            }
-        }
-        if self.levels_free {
-            for (output, level) in outputs.iter_mut().zip(self.levels(theta)) {
-                for y in output {
-                    *y += level;
-                }
             }
         }
         for (index, effect) in self.effects.iter().enumerate() {

@@ -15,7 +15,7 @@ pub struct Rows(pub DMatrix<f64>);
 impl Rows {
     /// The matrix; one without any entry takes the shape that is expected of it, because `[]` does not say
     /// how many columns it has.
-    pub(super) fn shaped(self, rows: usize, columns: usize) -> DMatrix<f64> {
+    pub(crate) fn shaped(self, rows: usize, columns: usize) -> DMatrix<f64> {
         if self.0.is_empty() && rows * columns == 0 {
             DMatrix::zeros(rows, columns)
         } else {

@@ -17,6 +17,7 @@ mod matrix;
 mod model_document;
 mod packed;
 mod read;
+mod read_explanation;
 mod schema;
 pub mod text;
 
@@ -29,5 +30,10 @@ pub use model_document::{
     DiagnosticsDocument, InvariantsDocument, MODEL_FORMAT, ModelDocument, Provenance,
 };
 pub use packed::CovarianceDocument;
+pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
 pub use read::{ReadModel, parse_model, read_model};
-pub use schema::model_schema;
+/// TEMPORARY until the page is in.
+pub fn explanation_page(_: &crate::explain::Explanation) -> Result<String, DocumentError> {
+    Ok(String::new())
+}
+pub use schema::{explanation_schema, model_schema};

@@ -88,7 +88,7 @@ pub fn parse_model(name: &str, text: &str) -> Result<ReadModel, DocumentError> {
     Ok(ReadModel { model, document })
 }
 
-fn no_document(name: &str, text: &str) -> DocumentError {
+pub(super) fn no_document(name: &str, text: &str) -> DocumentError {
     let name = name.to_owned();
     let line = text.lines().find(|line| !line.trim().is_empty());
     match line {
@@ -130,7 +130,7 @@ fn wrong_format(name: &str, format: &serde_json::Value) -> DocumentError {
 }
 
 /// What serde_json says, with the key added.
-fn broken(name: &str, text: &str, error: &serde_json::Error) -> DocumentError {
+pub(super) fn broken(name: &str, text: &str, error: &serde_json::Error) -> DocumentError {
     let (line, column) = (error.line(), error.column());
     let at = offset(text, line, column);
     let said = error.to_string();

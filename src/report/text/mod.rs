@@ -1,5 +1,6 @@
 //! Tables for people: nothing wider than a hundred columns.
 
+mod explanation_text;
 mod model_text;
 mod number;
 mod orders;
@@ -9,6 +10,7 @@ mod table;
 mod validation_text;
 mod verdict;
 
+pub use explanation_text::explanation_text;
 pub use model_text::{ModelText, model_text};
 pub use orders::comparison;
 pub use show::show_text;

@@ -1,0 +1,319 @@
+//! The augmented model as a document, and back.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
+use super::coordinates::Coordinates;
+use super::data::Segment;
+use super::effects::{self, Action};
+use super::explanation::{AugmentedModel, ModelEffect, SignalReference};
+use super::plant::{Plant, row_major};
+use super::simulation::delayed;
+use super::structure::{Direction, Functionals, Instance, Signal, Structure};
+use crate::log::Channel;
+use crate::report::Rows;
+
+/// Samples that an initial state is estimated from, at most.
+const INITIAL_SAMPLES: usize = 2000;
+/// Weight of the prior of an initial state: one sample's worth.
+const PRIOR: f64 = 1e-4;
+
+/// Why an augmented model cannot be run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "the messages explain the fields")]
+pub enum AugmentedError {
+    /// An effect that this version does not know.
+    #[error("the model holds the effect `{id}` {variant}, which this version does not know")]
+    Unknown { id: String, variant: String },
+    /// Numbers that do not fit together.
+    #[error("the model is damaged: {what}")]
+    Damaged { what: String },
+    /// Inputs that do not fit.
+    #[error("the model needs {needed} inputs of equal length, and {found} are given")]
+    Inputs { needed: usize, found: usize },
+    /// The outputs run away.
+    #[error("the simulation diverges on this input: it leaves the range that the model was fitted in; give an input of the amplitude of the recording")]
+    Diverges,
+    /// A correction is needed and was not given.
+    #[error("this explanation is relative to a simulator that is not linear: give its answer to the same input with --simulation FILE.csv (one column an output)")]
+    SimulationNeeded,
+}
+
+impl AugmentedModel {
+    /// Writes `structure` at `theta` down.
+    pub(crate) fn describe(
+        structure: &Structure,
+        theta: &[f64],
+        inputs: &[Channel],
+        outputs: &[Channel],
+        delays: &[usize],
+        constant: bool,
+    ) -> Self {
+        let plant = structure.plant(theta);
+        let rows = Functionals::new(&plant);
+        let effects = structure
+            .effects
+            .iter()
+            .enumerate()
+            .map(|(index, effect)| {
+                let force = matches!(effect.definition.action, Action::Force(..));
+                let numbers = structure.effect_numbers(theta, index);
+                let before = effect.amplitudes(structure.states()) + effect.definition.parameters.len();
+                ModelEffect {
+                    effect: effect.definition.id.to_owned(),
+                    variant: effect.definition.variant.to_owned(),
+                    channel: match effect.direction {
+                        Direction::Matched(input) if force => input,
+                        _ => effect.channel,
+                    },
+                    looks_at: match effect.signal {
+                        Signal::Output(o) => SignalReference::Output(o),
+                        Signal::Integral(o) => SignalReference::Integral(o),
+                        Signal::Difference(i, j) => SignalReference::Difference(i, j),
+                    },
+                    direction: if force {
+                        structure.direction(theta, &plant, &rows, index)
+                    } else {
+                        Vec::new()
+                    },
+                    parameters: structure.shape(theta, index),
+                    coefficients: numbers[before..].to_vec(),
+                }
+            })
+            .collect();
+        Self {
+            sample_time: plant.sample_time,
+            inputs: inputs.to_vec(),
+            input_delays: delays.to_vec(),
+            constant_input: constant,
+            outputs: outputs.to_vec(),
+            a: Rows(plant.a_matrix()),
+            b: Rows(plant.b_matrix()),
+            c: Rows(plant.c_matrix()),
+            d: Rows(plant.d_matrix()),
+            initial_states: (0..structure.initial.len())
+                .map(|s| structure.initial_state(theta, s).to_vec())
+                .collect(),
+            effects,
+            reference: None,
+        }
+    }
+
+    /// Outputs on a new input (`inputs[channel][sample]`, in the units of the recording), from rest or from `initial`.
+    ///
+    /// What changed in the recording has changed; events of the recording (a drift, a frozen sensor, a disturbance whose
+    /// phase is not known) are over. `simulation` is the answer of the original simulator to the same input, which a
+    /// model relative to a nonlinear simulator needs.
+    ///
+    /// # Errors
+    /// [`AugmentedError`]: a damaged model, inputs that do not fit, a simulation that diverges or is missing.
+    pub fn simulate(
+        &self,
+        inputs: &[&[f64]],
+        initial: Option<&[f64]>,
+        simulation: Option<&[&[f64]]>,
+    ) -> Result<Vec<Vec<f64>>, AugmentedError> {
+        let mut outputs = self.run(inputs, initial)?;
+        if let Some(reference) = &self.reference {
+            let simulation = simulation.ok_or(AugmentedError::SimulationNeeded)?;
+            let known = reference.run(inputs, None)?;
+            for ((y, known), given) in outputs.iter_mut().zip(&known).zip(simulation) {
+                if given.len() != y.len() {
+                    return Err(AugmentedError::Damaged {
+                        what: format!("{} simulated samples for {} inputs", given.len(), y.len()),
+                    });
+                }
+                for ((y, known), given) in y.iter_mut().zip(known).zip(*given) {
+                    *y += given - known;
+                }
+            }
+        }
+        Ok(outputs)
+    }
+
+    /// The initial state with which the model reproduces the first samples of `outputs` best, by a few steps of Gauss
+    /// and Newton from rest. Spread and level of the states on the recording are the prior (maximum a posteriori), so
+    /// that directions which few samples do not determine stay sensible.
+    ///
+    /// # Errors
+    /// As [`AugmentedModel::simulate`].
+    pub fn estimate_initial_state(&self, inputs: &[&[f64]], outputs: &[&[f64]]) -> Result<Vec<f64>, AugmentedError> {
+        let samples = inputs.first().map_or(0, |u| u.len()).min(INITIAL_SAMPLES);
+        let inputs: Vec<&[f64]> = inputs.iter().map(|u| &u[..samples]).collect();
+        let n = self.a.0.nrows();
+        let l = self.outputs.len();
+        let scale: Vec<f64> = (0..l)
+            .map(|o| {
+                let y = &outputs[o][..samples];
+                let mean = y.iter().sum::<f64>() / samples.max(1) as f64;
+                (y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / samples.max(1) as f64).sqrt().max(1e-12)
+            })
+            .collect();
+        let error = |x: &[f64]| -> Result<Vec<f64>, AugmentedError> {
+            let y = self.run(&inputs, Some(x))?;
+            Ok((0..l)
+                .flat_map(|o| (0..samples).map(move |k| (o, k)))
+                .map(|(o, k)| (outputs[o][k] - y[o][k]) / scale[o])
+                .collect())
+        };
+        let spread = 3.0 * scale.iter().copied().fold(0.0, f64::max);
+        let mut x = vec![0.0; n];
+        let mut e = error(&x)?;
+        let cost = |e: &[f64], x: &[f64]| -> f64 {
+            e.iter().map(|v| v * v).sum::<f64>() + PRIOR * x.iter().map(|v| (v / spread).powi(2)).sum::<f64>()
+        };
+        let mut damping = 1e-3;
+        for _ in 0..40 {
+            let step = 1e-6 * spread;
+            let mut columns = DMatrix::zeros(e.len(), n);
+            for i in 0..n {
+                let mut moved = x.clone();
+                moved[i] += step;
+                let ahead = error(&moved)?;
+                for (row, (a, b)) in ahead.iter().zip(&e).enumerate() {
+                    columns[(row, i)] = (b - a) / step;
+                }
+            }
+            let mut gram = columns.tr_mul(&columns);
+            let mut right = columns.tr_mul(&nalgebra::DVector::from_column_slice(&e));
+            for i in 0..n {
+                gram[(i, i)] = gram[(i, i)] * (1.0 + damping) + PRIOR / (spread * spread);
+                right[i] -= PRIOR * x[i] / (spread * spread);
+            }
+            let Some(solved) = gram.cholesky().map(|c| c.solve(&right)) else {
+                break;
+            };
+            let trial: Vec<f64> = x.iter().zip(solved.iter()).map(|(a, b)| a + b).collect();
+            match error(&trial) {
+                Ok(now) if cost(&now, &trial) < cost(&e, &x) => {
+                    let settled = cost(&e, &x) - cost(&now, &trial) < 1e-9 * cost(&e, &x);
+                    x = trial;
+                    e = now;
+                    damping *= 0.2;
+                    if settled {
+                        break;
+                    }
+                }
+                _ => damping = (damping * 10.0).max(1e-6),
+            }
+            if damping > 1e9 {
+                break;
+            }
+        }
+        Ok(x)
+    }
+
+    fn run(&self, inputs: &[&[f64]], initial: Option<&[f64]>) -> Result<Vec<Vec<f64>>, AugmentedError> {
+        let structure = self.structure()?;
+        let signals = structure.coordinates.given.inputs - usize::from(self.constant_input);
+        let samples = inputs.first().map_or(0, |u| u.len());
+        if inputs.len() != signals || inputs.iter().any(|u| u.len() != samples) {
+            return Err(AugmentedError::Inputs {
+                needed: signals,
+                found: inputs.len(),
+            });
+        }
+        let mut columns: Vec<Vec<f64>> = inputs
+            .iter()
+            .enumerate()
+            .map(|(j, u)| delayed(u, self.input_delays.get(j).copied().unwrap_or(0)))
+            .collect();
+        if self.constant_input {
+            columns.push(vec![1.0; samples]);
+        }
+        let segment = Segment {
+            inputs: columns,
+            outputs: Vec::new(),
+            start_time: 0.0,
+        };
+        let rest = vec![0.0; structure.states()];
+        structure
+            .simulate_fresh(&[], &segment, self.sample_time, initial.unwrap_or(&rest))
+            .ok_or(AugmentedError::Diverges)
+    }
+
+    /// The structure with all numbers fixed.
+    pub(crate) fn structure(&self) -> Result<Structure, AugmentedError> {
+        let damaged = |what: &str| AugmentedError::Damaged { what: what.to_owned() };
+        let (n, l) = (self.a.0.nrows(), self.c.0.nrows());
+        let r = self.inputs.len() + usize::from(self.constant_input);
+        let shaped = |m: &Rows, rows: usize, columns: usize, name: &str| -> Result<DMatrix<f64>, AugmentedError> {
+            let m = m.clone().shaped(rows, columns);
+            if m.shape() == (rows, columns) && m.iter().all(|v| v.is_finite()) {
+                Ok(m)
+            } else {
+                Err(damaged(&format!("{name} is {} x {}, not {rows} x {columns}", m.nrows(), m.ncols())))
+            }
+        };
+        if n > super::run::MOST_STATES || l == 0 || r == 0 {
+            return Err(damaged("too many states, or no input or output"));
+        }
+        if !(self.sample_time.is_finite() && self.sample_time > 0.0) {
+            return Err(damaged("the sample time is not positive"));
+        }
+        let plant = Plant {
+            states: n,
+            inputs: r,
+            outputs: l,
+            a: row_major(&shaped(&self.a, n, n, "A")?),
+            b: row_major(&shaped(&self.b, n, r, "B")?),
+            c: row_major(&shaped(&self.c, l, n, "C")?),
+            d: row_major(&shaped(&self.d, l, r, "D")?),
+            sample_time: self.sample_time,
+        };
+        let mut instances = Vec::new();
+        let mut known = Vec::new();
+        for effect in &self.effects {
+            let definition = effects::find(&effect.effect, &effect.variant).ok_or_else(|| AugmentedError::Unknown {
+                id: effect.effect.clone(),
+                variant: effect.variant.clone(),
+            })?;
+            let (signal, places) = match effect.looks_at {
+                SignalReference::Output(o) => (Signal::Output(o), vec![o]),
+                SignalReference::Integral(o) => (Signal::Integral(o), vec![o]),
+                SignalReference::Difference(i, j) => (Signal::Difference(i, j), vec![i, j]),
+            };
+            let instance = Instance {
+                definition,
+                channel: effect.channel,
+                signal,
+                direction: Direction::Free,
+            };
+            let on_output = matches!(definition.action, Action::Sensor(_));
+            let channels = if on_output { l } else { r };
+            if places.iter().any(|o| *o >= l) || effect.channel >= channels {
+                return Err(damaged("an effect belongs to a channel that does not exist"));
+            }
+            let mut numbers = effect.direction.clone();
+            for (p, v) in definition.parameters.iter().zip(&effect.parameters) {
+                if !v.is_finite() || p.logarithmic && *v <= 0.0 {
+                    return Err(damaged(&format!("{} of {} is {v}", p.name, definition.id)));
+                }
+                numbers.push(if p.logarithmic { v.ln() } else { *v });
+            }
+            numbers.extend(&effect.coefficients);
+            if numbers.len() != instance.len(n, l) || numbers.iter().any(|v| !v.is_finite()) {
+                return Err(damaged(&format!("{} has the wrong number of numbers", definition.id)));
+            }
+            instances.push(instance);
+            known.push(numbers);
+        }
+        let coordinates = Coordinates {
+            given: plant,
+            free_rows: Vec::new(),
+            active_inputs: Vec::new(),
+            to_here: DMatrix::identity(n, n),
+        };
+        Ok(Structure {
+            coordinates: Arc::new(coordinates),
+            plant_free: false,
+            initial_free: false,
+            initial: self.initial_states.clone(),
+            feedthrough_free: false,
+            effects: instances,
+            known,
+        })
+    }
+}

@@ -1,0 +1,384 @@
+//! The answer: everything that `explain` says, in the form in which it is written (`innovant-explanation/1`).
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::identify::Recording;
+use crate::log::Channel;
+use crate::report::Rows;
+
+/// Format name and version of the document.
+pub const EXPLANATION_FORMAT: &str = "innovant-explanation/1";
+
+/// Answers whose criteria differ by less explain the recording equally well (Kass and Raftery 1995: 6 is "strong").
+pub(crate) const EFFECTS_TIE: f64 = 6.0;
+
+/// The answer's kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// No significant difference beyond noise.
+    Consistent,
+    /// Same physics, other parameters or another initial state.
+    Parameters,
+    /// The missing physics has a name.
+    Named,
+    /// Two or more kinds explain the recording equally well.
+    Family,
+    /// Something is missing that nothing in the library explains adequately.
+    Unexplained,
+}
+
+/// What the recording shows that the simulation does not.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Explanation {
+    /// `innovant-explanation/1`.
+    pub format: String,
+    /// The answer's kind.
+    pub verdict: Verdict,
+    /// Probability that the answer is right, calibrated on recordings whose truth was known.
+    pub probability: f64,
+    /// A few lines for people.
+    pub summary: Vec<String>,
+    /// What was left out, most important first.
+    pub effects: Vec<EffectFound>,
+    /// What else was tried, best first.
+    pub alternatives: Vec<Alternative>,
+    /// Where recording and simulation differ.
+    #[serde(rename = "where")]
+    pub location: Location,
+    /// How well the outputs are explained, step by step.
+    pub fit: FitTable,
+    /// Parameters of the simulation that the recording contradicts.
+    pub parameters: Vec<ParameterChange>,
+    /// What the answer still leaves unexplained, with its test.
+    pub remaining: Remaining,
+    /// The recording that would settle an open question.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub separating_experiment: Option<String>,
+    /// How large the effect is.
+    pub effect_size: EffectSize,
+    /// Smallest effects that this recording could have shown, where nothing was found.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub detectable: Vec<Detectable>,
+    /// The noise that was estimated beside the answer.
+    pub noise: Vec<NoiseFound>,
+    /// The missing static law as the recording shows it, without a form assumed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub curve: Option<Curve>,
+    /// The augmented model, ready to simulate.
+    pub model: AugmentedModel,
+    /// Signals for pictures, thinned out.
+    pub signals: Vec<SignalTraces>,
+    /// The recordings.
+    pub recordings: Vec<Recording>,
+    /// Version of innovant.
+    pub version: String,
+}
+
+/// An effect that was left out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EffectFound {
+    /// Id: `coulomb_friction`.
+    pub effect: String,
+    /// Which form of it, where there are several.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub variant: String,
+    /// The channel it belongs to.
+    pub signal: String,
+    /// Where it acts: `input`, `force`, `sensor`, `path`.
+    pub port: String,
+    /// The law.
+    pub equation: String,
+    /// Its numbers.
+    pub parameters: BTreeMap<String, Quantity>,
+    /// What speaks for it.
+    pub evidence: Evidence,
+    /// In plain words.
+    pub sentence: String,
+}
+
+/// A number with its uncertainty and unit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Quantity {
+    /// Value.
+    pub value: f64,
+    /// Standard deviation; absent where the recording does not determine one.
+    pub std: Option<f64>,
+    /// Unit, empty when unknown or a pure number.
+    pub unit: String,
+}
+
+/// What speaks for an effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Evidence {
+    /// Decrease of Schwarz's criterion against the best explanation without it.
+    pub criterion_gain: f64,
+    /// What is needed of it, given how much was tried.
+    pub criterion_needed: f64,
+    /// Decrease of twice the negative log likelihood on blocks that were not fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heldout_gain: Option<f64>,
+    /// Its parameters in the first and in the second half of the recording agree: `|difference|/std`, the largest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub halves_disagree: Option<f64>,
+}
+
+/// A rival of the answer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Alternative {
+    /// Id.
+    pub effect: String,
+    /// Its gain in Schwarz's criterion, as a share of the answer's.
+    pub support: f64,
+    /// Its gain in Schwarz's criterion.
+    pub criterion_gain: f64,
+    /// Why it lost.
+    pub why_not: String,
+}
+
+/// Where recording and simulation differ.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Location {
+    /// Outputs that differ beyond noise.
+    pub outputs: Vec<String>,
+    /// Where in the loop: `input`, `inside`, `output`, `disturbance`.
+    pub port: Option<String>,
+    /// Windows `[from s, to s, strength]`, strongest first; empty means throughout.
+    pub time: Vec<[f64; 3]>,
+    /// Bands `[from Hz, to Hz, excess over noise in dB]`.
+    pub frequency: Vec<[f64; 3]>,
+    /// Operating regions in which the difference is larger than elsewhere.
+    pub regime: Vec<Regime>,
+}
+
+/// An operating region.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Regime {
+    /// What varies: a channel, `|u1|`, `d/dt y1`.
+    pub variable: String,
+    /// From this value ...
+    pub from: f64,
+    /// ... to this.
+    pub to: f64,
+    /// Mean square difference here over that elsewhere.
+    pub excess: f64,
+    /// Probability of as much by chance, all regions considered.
+    pub p_value: f64,
+}
+
+/// Fit figures of one set of samples.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FitFigure {
+    /// Root mean square error, in the unit of the output.
+    pub rmse: f64,
+    /// `100 (1 - |error|/|output - mean|)`.
+    pub fit_percent: f64,
+}
+
+/// Fit figures step by step, of the output that the effect shows most.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FitSteps {
+    /// The simulation as it was given.
+    pub simulation: FitFigure,
+    /// With other parameters and initial states only.
+    pub parameters_only: FitFigure,
+    /// With what was found.
+    pub augmented: FitFigure,
+    /// The noise that no model could foresee in simulation.
+    pub noise_floor: FitFigure,
+    /// 95 % interval of the decrease of the error, parameters only to augmented (paired block bootstrap).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub improvement_95: Option<[f64; 2]>,
+}
+
+/// Fit on what was fitted, and on what never was.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FitTable {
+    /// The output that the figures are of.
+    pub output: String,
+    /// Samples that were fitted.
+    pub train: FitSteps,
+    /// Blocks that were never fitted: models fitted again without them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heldout: Option<FitSteps>,
+    /// The blocks, `[from s, to s]`.
+    pub heldout_blocks: Vec<[f64; 2]>,
+}
+
+/// A property of the simulation that the recording contradicts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ParameterChange {
+    /// What: `natural frequency 1`, `static gain y1/u1`.
+    pub name: String,
+    /// In the simulation.
+    pub simulation: f64,
+    /// In the recording.
+    pub recording: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// What is left.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Remaining {
+    /// Whether what is left can be noise (or too little to matter).
+    pub adequate: bool,
+    /// Probability of as much structure by chance.
+    pub p_value: f64,
+    /// Share of the residual's variance that flexible features explain.
+    pub share: f64,
+    /// Flexible features that were tried.
+    pub features: usize,
+    /// In words.
+    pub sentence: String,
+}
+
+/// Three numbers beside the test.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EffectSize {
+    /// Share of the output's variance that the linear model explains.
+    pub linear_share: f64,
+    /// Share of the remaining error's variance that the effect removes.
+    pub removed_share: f64,
+    /// Decrease of the root mean square error on blocks that were not fitted, in the unit of the output.
+    pub heldout_gain: f64,
+}
+
+/// The smallest size at which an effect would have been seen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Detectable {
+    /// Id.
+    pub effect: String,
+    /// The channel.
+    pub signal: String,
+    /// Size in the output, root mean square, as a share of its standard deviation.
+    pub share_of_output: f64,
+}
+
+/// The noise of one output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NoiseFound {
+    /// The output.
+    pub output: String,
+    /// Autoregression `v[k] = -a1 v[k-1] - ... + e[k]`.
+    pub autoregression: Vec<f64>,
+    /// Scale of `e`.
+    pub innovation_std: f64,
+    /// Degrees of freedom of its distribution; absent for a Gaussian.
+    pub degrees_of_freedom: Option<f64>,
+}
+
+/// A static law as the recording shows it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Curve {
+    /// What it is a function of.
+    pub variable: String,
+    /// What it gives, in words with unit.
+    pub force: String,
+    /// Values of the variable.
+    pub at: Vec<f64>,
+    /// The law there.
+    pub value: Vec<f64>,
+    /// Its standard deviation.
+    pub std: Vec<f64>,
+    /// The law that was fitted, for comparison.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fitted: Vec<f64>,
+    /// Known shapes that it resembles, with the correlation.
+    pub resembles: Vec<(String, f64)>,
+}
+
+/// Signals of one output of one recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SignalTraces {
+    /// The output.
+    pub output: String,
+    /// Unit.
+    pub unit: String,
+    /// Which recording, from 0.
+    pub recording: usize,
+    /// Time of each point in seconds.
+    pub time: Vec<f64>,
+    /// As recorded.
+    pub recorded: Vec<f64>,
+    /// The simulation as it was given.
+    pub simulated: Vec<f64>,
+    /// With other parameters only.
+    pub parameters_only: Vec<f64>,
+    /// With what was found.
+    pub augmented: Vec<f64>,
+    /// Spectra of what is left, `[Hz, dB before, dB after]`.
+    pub spectrum: Vec<[f64; 3]>,
+}
+
+/// What an effect in a model looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SignalReference {
+    /// An output is the position.
+    Output(usize),
+    /// An output is the rate.
+    Integral(usize),
+    /// Position of one output relative to another.
+    Difference(usize, usize),
+}
+
+/// One effect in a model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ModelEffect {
+    /// Id.
+    pub effect: String,
+    /// Which form of it.
+    #[serde(default)]
+    pub variant: String,
+    /// Index of the input or output it belongs to.
+    pub channel: usize,
+    /// What a force looks at.
+    pub looks_at: SignalReference,
+    /// Direction through which a force enters, amplitude included.
+    #[serde(default)]
+    pub direction: Vec<f64>,
+    /// Shape parameters in the library's order.
+    pub parameters: Vec<f64>,
+    /// Residues of a mode, or the column of a missing path.
+    #[serde(default)]
+    pub coefficients: Vec<f64>,
+}
+
+/// A plant with effects: `x+ = A x + B u_eff + sum b_i f_i`, `y = sensor(C x + D u_eff)`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct AugmentedModel {
+    /// Sample time in seconds.
+    pub sample_time: f64,
+    /// Inputs.
+    pub inputs: Vec<Channel>,
+    /// Delay of each input in samples.
+    pub input_delays: Vec<usize>,
+    /// The last column of `B` and `D` belongs to the constant 1.
+    pub constant_input: bool,
+    /// Outputs.
+    pub outputs: Vec<Channel>,
+    /// State matrix.
+    #[serde(rename = "A")]
+    pub a: Rows,
+    /// Input matrix.
+    #[serde(rename = "B")]
+    pub b: Rows,
+    /// Output matrix.
+    #[serde(rename = "C")]
+    pub c: Rows,
+    /// Feedthrough.
+    #[serde(rename = "D")]
+    pub d: Rows,
+    /// State at the beginning of each recording.
+    pub initial_states: Vec<Vec<f64>>,
+    /// Effects; those that the simulation knew already come first.
+    pub effects: Vec<ModelEffect>,
+    /// What stood for a simulator that is known by its outputs alone: its answer to a new input is corrected by the
+    /// difference of the two models.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<Box<AugmentedModel>>,
+}

@@ -1,0 +1,274 @@
+//! Where recording and simulation differ: in time, frequency and operating region.
+
+use realfft::RealFftPlanner;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::data::{Data, Series};
+use super::effects;
+use super::explanation::Regime;
+use super::fit::Fit;
+use super::noise::{Mask, Noise};
+
+/// Family-wise level of every map.
+const LEVEL: f64 = 1e-3;
+/// Windows that cover more of the recording than this are no windows: the difference is throughout.
+const THROUGHOUT: f64 = 0.6;
+/// Excess in dB from which a band is listed.
+const EXCESS_DB: f64 = 1.0;
+/// Ratio from which an operating region is listed.
+const REGION: f64 = 1.5;
+/// Bands of the frequency map, about.
+const BANDS: usize = 16;
+
+/// Squares of the residual under the noise that is left beside the best explanation: 1 in the mean where nothing is
+/// missing. One series an output and segment.
+pub(crate) fn excess(residual: &Series, noise: &Noise) -> Series {
+    noise
+        .whiten(residual)
+        .iter()
+        .map(|e| e.iter().map(|v| v * v).collect())
+        .collect()
+}
+
+/// Multi-scale windows of segment 0 in which `squares` exceeds noise, `[from s, to s, mean square]`; empty when that is
+/// nowhere or throughout.
+pub(crate) fn windows(data: &Data, squares: &Series, mask: &Mask) -> Vec<[f64; 3]> {
+    let segment = &data.segments[0];
+    let n = segment.samples();
+    let l = data.outputs;
+    // Outputs together; a prefix sum makes every window cheap.
+    let mut sums = vec![0.0; n + 1];
+    let mut counts = vec![0.0; n + 1];
+    for k in 0..n {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for o in 0..l {
+            if mask[o][k] {
+                sum += squares[o][k];
+                count += 1.0;
+            }
+        }
+        sums[k + 1] = sums[k] + sum;
+        counts[k + 1] = counts[k] + count;
+    }
+    // Fourth moment over squared second, robustly: tails widen the test.
+    let mut flagged = vec![false; n];
+    let mut length = n / 4;
+    let mut tests = 0.0;
+    let mut windows = Vec::new();
+    while length >= 24 {
+        let step = length / 2;
+        let mut from = 0;
+        while from + length <= n {
+            windows.push((from, from + length));
+            tests += 1.0;
+            from += step;
+        }
+        length /= 2;
+    }
+    for (from, to) in windows {
+        let (sum, count) = (sums[to] - sums[from], counts[to] - counts[from]);
+        if count < 8.0 {
+            continue;
+        }
+        let p = ChiSquared::new(count).map_or(1.0, |d| d.sf(sum));
+        if p * tests < LEVEL && sum > 1.3 * count {
+            flagged[from..to].fill(true);
+        }
+    }
+    let covered = flagged.iter().filter(|f| **f).count() as f64 / n.max(1) as f64;
+    if covered > THROUGHOUT || covered == 0.0 {
+        return Vec::new();
+    }
+    let time = |k: usize| segment.start_time + k as f64 * data.sample_time;
+    let mut found = Vec::new();
+    let mut k = 0;
+    while k < n {
+        if !flagged[k] {
+            k += 1;
+            continue;
+        }
+        let from = k;
+        while k < n && flagged[k] {
+            k += 1;
+        }
+        let (from, to) = trimmed(&sums, &counts, from, k);
+        let strength = (sums[to] - sums[from]) / (counts[to] - counts[from]).max(1.0);
+        found.push([time(from), time(to), strength]);
+    }
+    found.sort_by(|a, b| b[2].total_cmp(&a[2]));
+    found.truncate(8);
+    found
+}
+
+/// The part of a window whose excess is largest: ends without any are cut off.
+fn trimmed(sums: &[f64], counts: &[f64], from: usize, to: usize) -> (usize, usize) {
+    // Largest sum of (square - threshold): Kadane's scan.
+    let threshold = 2.0;
+    let (mut best, mut best_at, mut sum, mut start) = (0.0, (from, to), 0.0, from);
+    for k in from..to {
+        sum += sums[k + 1] - sums[k] - threshold * (counts[k + 1] - counts[k]);
+        if sum <= 0.0 {
+            sum = 0.0;
+            start = k + 1;
+        } else if sum > best {
+            best = sum;
+            best_at = (start, k + 1);
+        }
+    }
+    best_at
+}
+
+/// Power of a residual over frequency, all series of one output together, Hann window: `(Hz, power)`.
+pub(crate) fn spectrum(residual: &Series, outputs: usize, output: usize, sample_time: f64) -> Vec<(f64, f64)> {
+    let mut total: Vec<(f64, f64)> = Vec::new();
+    for column in residual.iter().skip(output).step_by(outputs) {
+        let n = column.len();
+        if n < 16 || !total.is_empty() && total.len() != n / 2 + 1 {
+            continue;
+        }
+        let mut planner = RealFftPlanner::<f64>::new();
+        let transform = planner.plan_fft_forward(n);
+        let mut windowed: Vec<f64> = column
+            .iter()
+            .enumerate()
+            .map(|(k, v)| v * (std::f64::consts::PI * (k as f64 + 0.5) / n as f64).sin().powi(2))
+            .collect();
+        let mut out = transform.make_output_vec();
+        if transform.process(&mut windowed, &mut out).is_err() {
+            continue;
+        }
+        let scale = sample_time / (0.375 * n as f64);
+        let power = out.iter().map(|v| v.norm_sqr() * scale);
+        if total.is_empty() {
+            total = power
+                .enumerate()
+                .map(|(i, p)| (i as f64 / (n as f64 * sample_time), p))
+                .collect();
+        } else {
+            for (t, p) in total.iter_mut().zip(power) {
+                t.1 += p;
+            }
+        }
+    }
+    total
+}
+
+/// Edges (indices) of logarithmic bands over a spectrum of `bins` bins, each wide enough for a test.
+fn bands(bins: usize) -> Vec<(usize, usize)> {
+    let mut edges = Vec::new();
+    let mut from = 2;
+    let ratio = (bins as f64 / 4.0).powf(1.0 / BANDS as f64).max(1.05);
+    while from < bins {
+        let to = ((from as f64 * ratio).ceil() as usize).max(from + 6).min(bins);
+        edges.push((from, to));
+        from = to;
+    }
+    edges
+}
+
+/// Bands `[from Hz, to Hz, dB]` in which the residual `before` exceeds what is left `after`.
+pub(crate) fn frequencies(before: &[(f64, f64)], after: &[(f64, f64)]) -> Vec<[f64; 3]> {
+    let edges = bands(before.len().min(after.len()));
+    let tests = edges.len() as f64;
+    edges
+        .into_iter()
+        .filter_map(|(from, to)| {
+            let sum = |s: &[(f64, f64)]| s[from..to].iter().map(|p| p.1).sum::<f64>();
+            let (b, a) = (sum(before), sum(after));
+            let db = 10.0 * (b / a.max(1e-300)).log10();
+            // The window correlates neighbours: about 2/3 of the bins are independent, two degrees of freedom each.
+            let freedom = 2.0 * (to - from) as f64 * 0.66;
+            let p = ChiSquared::new(freedom).map_or(1.0, |d| d.sf(freedom * b / a.max(1e-300)));
+            (db > EXCESS_DB && p * tests < LEVEL).then(|| [before[from].0, before[to - 1].0, db])
+        })
+        .collect()
+}
+
+/// Thinned spectra for a picture, `[Hz, dB before, dB after]`.
+pub(crate) fn spectrum_picture(before: &[(f64, f64)], after: &[(f64, f64)]) -> Vec<[f64; 3]> {
+    let bins = before.len().min(after.len());
+    let mut picture = Vec::new();
+    let mut from = 1;
+    while from < bins {
+        let to = ((from as f64 * 1.04).ceil() as usize).max(from + 2).min(bins);
+        let mean = |s: &[(f64, f64)]| {
+            10.0 * (s[from..to].iter().map(|p| p.1).sum::<f64>() / (to - from) as f64).max(1e-300).log10()
+        };
+        picture.push([0.5 * (before[from].0 + before[to - 1].0), mean(before), mean(after)]);
+        from = to;
+    }
+    picture
+}
+
+/// Operating regions of output `output` in which the difference is larger than elsewhere.
+pub(crate) fn regimes(
+    data: &Data,
+    fit: &Fit,
+    squares: &Series,
+    mask: &Mask,
+    output: usize,
+    names: (&[String], &[String]),
+) -> Vec<Regime> {
+    let l = data.outputs;
+    let h = data.sample_time;
+    let mut variables: Vec<(String, Vec<f64>)> = Vec::new();
+    let over_segments = |f: &dyn Fn(usize) -> Vec<f64>| -> Vec<f64> { (0..data.segments.len()).flat_map(f).collect() };
+    for input in 0..data.signals() {
+        let u = over_segments(&|s| data.segments[s].inputs[input].clone());
+        variables.push((format!("|{}|", names.0[input]), u.iter().map(|v| v.abs()).collect()));
+        variables.push((names.0[input].clone(), u));
+    }
+    let y = over_segments(&|s| fit.simulated[s * l + output].clone());
+    let rate = over_segments(&|s| {
+        let y = &fit.simulated[s * l + output];
+        (0..y.len())
+            .map(|k| (y[(k + 1).min(y.len() - 1)] - y[k.saturating_sub(1)]) / (2.0 * h))
+            .collect()
+    });
+    variables.push((format!("|{}|", names.1[output]), y.iter().map(|v| v.abs()).collect()));
+    variables.push((names.1[output].clone(), y));
+    variables.push((format!("|d/dt {}|", names.1[output]), rate.iter().map(|v| v.abs()).collect()));
+    variables.push((format!("d/dt {}", names.1[output]), rate));
+    let square = over_segments(&|s| squares[s * l + output].clone());
+    let counts: Vec<bool> = (0..data.segments.len()).flat_map(|s| mask[s * l + output].clone()).collect();
+    let mut found = Vec::new();
+    let tests = (variables.len() * 8) as f64;
+    for (name, values) in variables {
+        let edges: Vec<f64> = (0..=8)
+            .map(|i| effects::level(&values, f64::from(i) / 8.0, |v| v))
+            .collect();
+        for pair in edges.windows(2) {
+            let (mut inside, mut n_in, mut outside, mut n_out) = (0.0, 0.0, 0.0, 0.0);
+            for ((v, e), keep) in values.iter().zip(&square).zip(&counts) {
+                if !keep {
+                    continue;
+                }
+                if *v >= pair[0] && *v < pair[1] {
+                    inside += e;
+                    n_in += 1.0;
+                } else {
+                    outside += e;
+                    n_out += 1.0;
+                }
+            }
+            if n_in < 20.0 || n_out < 20.0 {
+                continue;
+            }
+            let elsewhere = f64::max(outside / n_out, 1e-300);
+            let ratio = inside / n_in / elsewhere;
+            let p = ChiSquared::new(n_in).map_or(1.0, |d| d.sf(inside / elsewhere)) * tests;
+            if ratio > REGION && p < LEVEL {
+                found.push(Regime {
+                    variable: name.clone(),
+                    from: pair[0],
+                    to: pair[1],
+                    excess: ratio,
+                    p_value: p.min(1.0),
+                });
+            }
+        }
+    }
+    found.sort_by(|a, b| b.excess.total_cmp(&a.excess));
+    found.truncate(6);
+    found
+}

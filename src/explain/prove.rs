@@ -1,0 +1,144 @@
+//! The proof: figures on blocks that were never fitted.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::data::{Data, Series};
+use super::explanation::{FitFigure, FitSteps};
+use super::fit::{Effort, Fit, Problem};
+use super::noise::Mask;
+
+/// Blocks that are held out, spread over the recording.
+const BLOCKS: usize = 5;
+/// Share of the recording that they make up.
+const SHARE: f64 = 0.25;
+/// Draws of the bootstrap.
+const DRAWS: usize = 500;
+/// Pieces that it draws, in total: each many correlation times long.
+const PIECES: usize = 40;
+
+/// Blocks `(segment, from, to)` that are held out.
+pub(crate) fn blocks(data: &Data) -> Vec<(usize, usize, usize)> {
+    let mut list = Vec::new();
+    for (s, segment) in data.segments.iter().enumerate() {
+        let n = segment.samples();
+        let length = (SHARE * n as f64 / BLOCKS as f64) as usize;
+        for b in 0..BLOCKS {
+            let centre = (b as f64 + 0.5) / BLOCKS as f64 * n as f64;
+            let from = (centre - length as f64 / 2.0).max(0.0) as usize;
+            list.push((s, from, (from + length).min(n)));
+        }
+    }
+    list
+}
+
+/// The mask with the blocks taken out, and that with nothing else.
+pub(crate) fn split(data: &Data, mask: &Mask) -> (Mask, Mask) {
+    let mut train = mask.clone();
+    let mut test: Mask = mask.iter().map(|m| vec![false; m.len()]).collect();
+    for (s, from, to) in blocks(data) {
+        for o in 0..data.outputs {
+            let series = s * data.outputs + o;
+            for k in from..to {
+                test[series][k] = mask[series][k];
+                train[series][k] = false;
+            }
+        }
+    }
+    (train, test)
+}
+
+/// `fit` again without the blocks.
+pub(crate) fn refit(problem: &Problem, fit: &Fit, train: &Mask) -> Option<Fit> {
+    let without = Problem {
+        mask: train.clone(),
+        ..problem.clone()
+    };
+    Fit::run(&without, fit.structure.clone(), fit.theta.clone(), Some(&fit.noise), Effort::RANK)
+}
+
+/// Fit figure of one output over the samples of `mask`.
+pub(crate) fn figure(data: &Data, residual: &Series, mask: &Mask, output: usize) -> FitFigure {
+    let (mut error, mut n, mut sum) = (0.0, 0.0, 0.0);
+    let outputs: Vec<&Vec<f64>> = data.outputs_as_series().collect();
+    let each = |f: &mut dyn FnMut(f64, f64)| {
+        for s in (output..outputs.len()).step_by(data.outputs) {
+            for k in 0..outputs[s].len() {
+                if mask[s][k] {
+                    f(outputs[s][k], residual[s][k]);
+                }
+            }
+        }
+    };
+    each(&mut |y, r| {
+        error += r * r;
+        sum += y;
+        n += 1.0;
+    });
+    let mean = sum / f64::max(n, 1.0);
+    let mut there = 0.0;
+    each(&mut |y, _| there += (y - mean).powi(2));
+    FitFigure {
+        rmse: (error / f64::max(n, 1.0)).sqrt(),
+        fit_percent: 100.0 * (1.0 - (error / f64::max(there, 1e-300)).sqrt()),
+    }
+}
+
+/// Residuals of the four steps.
+pub(crate) struct Steps<'a> {
+    pub simulation: &'a Series,
+    pub parameters_only: &'a Series,
+    pub augmented: &'a Series,
+    /// Share of the augmented residual's variance that is structure, not noise.
+    pub structure_share: f64,
+}
+
+/// The table row for the samples of `mask`.
+pub(crate) fn steps(data: &Data, steps: &Steps, mask: &Mask, output: usize, seed: Option<u64>) -> FitSteps {
+    let augmented = figure(data, steps.augmented, mask, output);
+    let rmse = augmented.rmse * (1.0 - steps.structure_share).max(0.0).sqrt();
+    let lost = 100.0 - augmented.fit_percent;
+    FitSteps {
+        simulation: figure(data, steps.simulation, mask, output),
+        parameters_only: figure(data, steps.parameters_only, mask, output),
+        augmented,
+        noise_floor: FitFigure {
+            rmse,
+            fit_percent: 100.0 - lost * rmse / augmented.rmse.max(1e-300),
+        },
+        improvement_95: seed.and_then(|seed| improvement(steps, mask, data.outputs, output, seed)),
+    }
+}
+
+/// Paired block bootstrap of the decrease of the root mean square error.
+fn improvement(steps: &Steps, mask: &Mask, outputs: usize, output: usize, seed: u64) -> Option<[f64; 2]> {
+    let mut pairs: Vec<(f64, f64)> = Vec::new();
+    for s in (output..mask.len()).step_by(outputs) {
+        for k in 0..mask[s].len() {
+            if mask[s][k] {
+                pairs.push((steps.parameters_only[s][k].powi(2), steps.augmented[s][k].powi(2)));
+            }
+        }
+    }
+    let length = pairs.len() / PIECES;
+    if length < 4 {
+        return None;
+    }
+    let pieces: Vec<(f64, f64)> = pairs
+        .chunks_exact(length)
+        .map(|c| c.iter().fold((0.0, 0.0), |(a, b), p| (a + p.0, b + p.1)))
+        .collect();
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let n = (pieces.len() * length) as f64;
+    let mut gains: Vec<f64> = (0..DRAWS)
+        .map(|_| {
+            let (a, b) = (0..pieces.len()).fold((0.0, 0.0), |(a, b), _| {
+                let piece = pieces[random.random_range(0..pieces.len())];
+                (a + piece.0, b + piece.1)
+            });
+            (a / n).sqrt() - (b / n).sqrt()
+        })
+        .collect();
+    gains.sort_by(f64::total_cmp);
+    Some([gains[DRAWS / 40], gains[DRAWS - 1 - DRAWS / 40]])
+}

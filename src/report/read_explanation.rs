@@ -1,0 +1,51 @@
+//! Reading an explanation document.
+
+use std::fs;
+use std::path::Path;
+
+use super::error::DocumentError;
+use super::read::{broken, no_document};
+use crate::explain::{EXPLANATION_FORMAT, Explanation};
+
+/// Whether `text` is JSON that calls itself an explanation.
+pub fn is_explanation(text: &str) -> bool {
+    #[derive(serde::Deserialize)]
+    struct Probe {
+        format: String,
+    }
+    serde_json::from_str::<Probe>(text).is_ok_and(|p| p.format.starts_with("innovant-explanation/"))
+}
+
+/// Reads an explanation from a file.
+///
+/// # Errors
+/// [`DocumentError`] names file, line, column and key.
+pub fn read_explanation(path: &Path) -> Result<Explanation, DocumentError> {
+    let name = path.display().to_string();
+    let bytes = fs::read(path).map_err(|source| DocumentError::Open {
+        name: name.clone(),
+        source,
+    })?;
+    let text = String::from_utf8(bytes).map_err(|_| DocumentError::NotText { name: name.clone() })?;
+    parse_explanation(&name, &text)
+}
+
+/// Reads an explanation from text; `name` stands for the file in messages.
+///
+/// # Errors
+/// [`DocumentError`] names file, line, column and key.
+pub fn parse_explanation(name: &str, text: &str) -> Result<Explanation, DocumentError> {
+    if !text.trim_start().starts_with('{') {
+        return Err(no_document(name, text));
+    }
+    let explanation: Explanation = serde_json::from_str(text).map_err(|error| broken(name, text, &error))?;
+    if explanation.format != EXPLANATION_FORMAT {
+        return Err(DocumentError::Format {
+            name: name.to_owned(),
+            found: explanation.format,
+            expected: EXPLANATION_FORMAT,
+            advice: "it was written by another version of innovant: update this one, or explain the recording again",
+        });
+    }
+    Ok(explanation)
+}

@@ -1,0 +1,31 @@
+//! An explanation for the terminal: the lines that an engineer believes.
+
+use std::fmt::Write as _;
+
+use super::wrapped;
+use crate::explain::{Explanation, Verdict};
+
+/// Verdict and summary.
+pub fn explanation_text(explanation: &Explanation) -> String {
+    let word = match explanation.verdict {
+        Verdict::Consistent => "CONSISTENT",
+        Verdict::Parameters => "PARAMETERS",
+        Verdict::Named => "NAMED",
+        Verdict::Family => "FAMILY",
+        Verdict::Unexplained => "UNEXPLAINED",
+    };
+    let names: Vec<String> = explanation.effects.iter().map(|e| e.effect.replace('_', " ")).collect();
+    let mut text = String::new();
+    let _ = if names.is_empty() {
+        writeln!(text, "{word}")
+    } else {
+        writeln!(text, "{word}: {}", names.join(" and "))
+    };
+    for line in &explanation.summary {
+        text.push_str(&wrapped("  ", line));
+        if !text.ends_with('\n') {
+            text.push('\n');
+        }
+    }
+    text
+}
