@@ -23,8 +23,6 @@ pub(crate) const OF_REMOVED: f64 = 0.03;
 /// What a residual still holds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Adequacy {
-    /// Gain of all features together.
-    pub statistic: f64,
     pub features: usize,
     pub p_value: f64,
     /// Share of the whitened residual's variance that the features explain, less what chance explains.
@@ -52,7 +50,6 @@ pub(crate) fn adequacy(problem: &Problem, fit: &Fit, before: Option<&Fit>) -> Op
     let statistic = gained / variance.max(1e-300);
     let p_value = ChiSquared::new(features as f64).map_or(1.0, |d| d.sf(statistic));
     Some(Adequacy {
-        statistic,
         features,
         p_value,
         of_removed: before.map_or(f64::INFINITY, |before| {

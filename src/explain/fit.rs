@@ -16,8 +16,8 @@ const STEP_SHARE: f64 = 1e-5;
 /// Steps stay between these, whatever the outputs do.
 const SMALLEST_STEP: f64 = 1e-14;
 const LARGEST_STEP: f64 = 1e6;
-/// The deviance has settled when an accepted step lowers it by less.
-const SETTLED: f64 = 0.02;
+/// Steps that are made with one set of derivatives before they are taken anew.
+const STEPS_EACH: usize = 2;
 
 /// How hard a fit tries.
 #[derive(Debug, Clone, Copy)]
@@ -26,15 +26,17 @@ pub(crate) struct Effort {
     pub rounds: usize,
     /// Steps a round.
     pub steps: usize,
+    /// The deviance has settled when a step lowers it by less.
+    pub settled: f64,
 }
 
 impl Effort {
     /// To see what deserves more.
-    pub const SCOUT: Self = Self { rounds: 1, steps: 5 };
+    pub const SCOUT: Self = Self { rounds: 1, steps: 6, settled: 0.5 };
     /// To rank candidates.
-    pub const RANK: Self = Self { rounds: 2, steps: 12 };
+    pub const RANK: Self = Self { rounds: 2, steps: 14, settled: 0.1 };
     /// To report.
-    pub const FINAL: Self = Self { rounds: 3, steps: 40 };
+    pub const FINAL: Self = Self { rounds: 3, steps: 40, settled: 0.02 };
 }
 
 /// What fits share: the data, which samples count, how the outputs are scaled.
@@ -147,7 +149,7 @@ impl Fit {
                 (0, None) => Noise::white(&fit.residual, problem.data.outputs, &problem.mask),
                 _ => fit.noise.clone(),
             };
-            fit.descend(problem, &noise, effort.steps);
+            fit.descend(problem, &noise, effort);
             fit.noise = problem.noise(&fit.residual);
             fit.deviance = fit.noise.deviance(&fit.residual, &problem.mask);
             fit.free = fit.structure.len() + fit.noise.len();
@@ -164,17 +166,29 @@ impl Fit {
         best
     }
 
-    /// Steps at a fixed noise model while they help.
-    fn descend(&mut self, problem: &Problem, noise: &Noise, most: usize) {
+    /// Steps at a fixed noise model while they help. Derivatives serve several steps: near the optimum they hardly
+    /// change, and they are what costs.
+    fn descend(&mut self, problem: &Problem, noise: &Noise, effort: Effort) {
         let bounds = self.structure.bounds();
         let mut damping = 1e-3;
         let mut cost = noise.deviance(&self.residual, &problem.mask);
-        for _ in 0..most {
-            let Some(system) = self.normal_equations(problem, noise) else {
+        let mut jacobian: Option<Jacobian> = None;
+        let mut age = 0;
+        for _ in 0..effort.steps {
+            if age >= STEPS_EACH {
+                jacobian = None;
+            }
+            let fresh = jacobian.is_none();
+            if fresh {
+                age = 0;
+                jacobian = self.jacobian(problem, noise);
+            }
+            let Some(derivatives) = &jacobian else {
                 return;
             };
-            let mut accepted = false;
-            for _ in 0..8 {
+            let system = derivatives.normal_equations(problem, noise, &self.residual);
+            let mut gained = None;
+            for _ in 0..if fresh { 8 } else { 1 } {
                 let Some(step) = system.step(damping) else {
                     damping *= 10.0;
                     continue;
@@ -190,26 +204,28 @@ impl Fit {
                     let residual = problem.data.residual(&simulated);
                     let now = noise.deviance(&residual, &problem.mask);
                     if now < cost {
-                        let gained = cost - now;
+                        gained = Some(cost - now);
                         self.theta = trial;
                         self.simulated = simulated;
                         self.residual = residual;
                         cost = now;
                         damping = (damping * 0.2).max(1e-9);
-                        if gained < SETTLED {
-                            return;
-                        }
-                        accepted = true;
                         break;
                     }
                 }
-                damping *= 8.0;
+                if fresh {
+                    damping *= 8.0;
+                }
                 if damping > 1e8 {
                     return;
                 }
             }
-            if !accepted {
-                return;
+            age += 1;
+            match gained {
+                Some(gained) if gained >= effort.settled => {}
+                // Little or nothing: the end with new derivatives, else a reason to take them anew.
+                _ if fresh => return,
+                _ => age = STEPS_EACH,
             }
         }
     }
@@ -257,42 +273,22 @@ impl Fit {
         columns
     }
 
-    fn normal_equations(&mut self, problem: &Problem, noise: &Noise) -> Option<NormalEquations> {
+    /// Whitened derivatives of the values that count.
+    fn jacobian(&mut self, problem: &Problem, noise: &Noise) -> Option<Jacobian> {
         let columns = self.sensitivities(problem);
         let rows: usize = problem.count();
-        let whitened = noise.whiten(&self.residual);
-        let mut weights = Vec::with_capacity(rows);
-        let mut e = Vec::with_capacity(rows);
-        for (column, mask) in whitened.iter().zip(&problem.mask) {
-            for (v, keep) in column.iter().zip(mask) {
-                if *keep {
-                    let w = noise.weight(*v).sqrt();
-                    weights.push(w);
-                    e.push(w * v);
-                }
-            }
-        }
         let used: Vec<usize> = (0..columns.len()).filter(|i| columns[*i].is_some()).collect();
         if used.is_empty() {
             return None;
         }
-        let mut flat = Vec::with_capacity(rows * (used.len() + 1));
+        let mut flat = Vec::with_capacity(rows * used.len());
         for column in columns.iter().flatten() {
-            let from = flat.len();
             for (series, mask) in noise.whiten(column).iter().zip(&problem.mask) {
                 flat.extend(series.iter().zip(mask).filter_map(|(v, keep)| keep.then_some(*v)));
             }
-            for (v, w) in flat[from..].iter_mut().zip(&weights) {
-                *v *= w;
-            }
         }
-        flat.extend_from_slice(&e);
-        let m = used.len();
-        let all = DMatrix::from_vec(rows, m + 1, flat);
-        let gram = multiply_tn(&all, &all);
-        gram.iter().all(|v| v.is_finite()).then(|| NormalEquations {
-            hessian: gram.view((0, 0), (m, m)).into_owned(),
-            gradient: gram.view((0, m), (m, 1)).column(0).into_owned(),
+        flat.iter().all(|v| v.is_finite()).then(|| Jacobian {
+            columns: DMatrix::from_vec(rows, used.len(), flat),
             used,
             total: self.theta.len(),
         })
@@ -301,7 +297,8 @@ impl Fit {
     /// Covariance of the numbers (those that move nothing have none).
     pub fn covariance(&mut self, problem: &Problem) -> Option<DMatrix<f64>> {
         let noise = self.noise.clone();
-        let system = self.normal_equations(problem, &noise)?;
+        let jacobian = self.jacobian(problem, &noise)?;
+        let system = jacobian.normal_equations(problem, &noise, &self.residual);
         let m = system.used.len();
         let scale: Vec<f64> = (0..m).map(|i| system.hessian[(i, i)].sqrt().max(1e-300)).collect();
         let mut scaled = system.hessian.clone();
@@ -320,6 +317,48 @@ impl Fit {
             }
         }
         Some(covariance)
+    }
+}
+
+/// Whitened derivatives, a column a number that moves anything.
+struct Jacobian {
+    columns: DMatrix<f64>,
+    used: Vec<usize>,
+    total: usize,
+}
+
+impl Jacobian {
+    /// The weighted least-squares system at `residual`.
+    fn normal_equations(&self, problem: &Problem, noise: &Noise, residual: &Series) -> NormalEquations {
+        let rows = self.columns.nrows();
+        let mut weights = Vec::with_capacity(rows);
+        let mut e = Vec::with_capacity(rows);
+        for (column, mask) in noise.whiten(residual).iter().zip(&problem.mask) {
+            for (v, keep) in column.iter().zip(mask) {
+                if *keep {
+                    weights.push(noise.weight(*v));
+                    e.push(*v);
+                }
+            }
+        }
+        let target = DVector::from_iterator(rows, e.iter().zip(&weights).map(|(e, w)| e * w));
+        let hessian = if noise.degrees.is_finite() {
+            let mut weighted = self.columns.clone();
+            for mut column in weighted.column_iter_mut() {
+                for (v, w) in column.iter_mut().zip(&weights) {
+                    *v *= w;
+                }
+            }
+            multiply_tn(&self.columns, &weighted)
+        } else {
+            multiply_tn(&self.columns, &self.columns)
+        };
+        NormalEquations {
+            hessian,
+            gradient: self.columns.tr_mul(&target),
+            used: self.used.clone(),
+            total: self.total,
+        }
     }
 }
 

@@ -9,13 +9,11 @@ use super::effects::{self, Action, Definition, Sense, Unit};
 use super::explanation::Verdict;
 use super::exact::{Freeze, frozen, spacing};
 use super::fit::{Effort, Fit, Problem};
-use super::search::{Boring, Ranked, fit_lead, second_effects, single_effects};
+use super::search::{Boring, Ranked, second_effects, single_effects};
 use super::structure::{Functionals, Signal, Structure, dot};
 
 /// Places, laws and starting values that are tried on one recording, about: a name among so many needs
 /// `2 ln(300)` more than nothing at all (the maximum of that many chi-squares with one degree of freedom).
-const TRIED: f64 = 300.0;
-/// `2 ln(TRIED)`.
 pub(crate) const NEEDED: f64 = 11.4;
 /// Names whose criteria differ by less explain the recording equally well (Kass and Raftery 1995: 6 is "strong").
 const TIE: f64 = super::explanation::EFFECTS_TIE;
@@ -24,6 +22,8 @@ const MODE_HANDICAP: f64 = 0.01;
 /// What an answer owes that physics allows but that is rare, such as a hysteresis that gives energy back: odds of 1
 /// to 400.
 const UNUSUAL: f64 = 12.0;
+/// With a larger probability what is left is called noise, and no second effect is looked for.
+const NOTHING_LEFT: f64 = 0.02;
 /// Probability of a larger difference when the plant is as it was given.
 const SAME_PLANT: f64 = 1e-3;
 /// Share of the samples that a threshold must leave on either side of it.
@@ -124,6 +124,7 @@ pub(crate) fn inquire(
         r.criterion += penalty(r, known, base, count);
     }
     ranked.retain(|r| sane(&problem, &r.fit, known));
+    add_free_twins(&problem, &finding.boring, &mut ranked, known, base);
     let ranked_all = ranked.clone();
     ranked.retain(|r| plant_may_stay(r, &ranked_all, known));
     ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
@@ -134,7 +135,14 @@ pub(crate) fn inquire(
     if let Some(best) = best {
         let mut fit = polished(&problem, &best.fit);
         let mut gain = base - fit.criterion(count);
-        if let Some(pair) = pair(&problem, &ranked_all, known, base, allowed) {
+        // Where nothing is left there is no second effect to find.
+        let nothing_left = adequacy(&problem, &fit, None).is_some_and(|a| a.p_value > NOTHING_LEFT);
+        let second = if nothing_left {
+            None
+        } else {
+            pair(&problem, &ranked_all, known, base, allowed)
+        };
+        if let Some(pair) = second {
             let polished = polished(&problem, &pair);
             gain = gain.max(base - polished.criterion(count));
             fit = polished;
@@ -240,10 +248,10 @@ enum More {
 
 const REFINEMENTS: &[Refinement] = &[
     Refinement { simple: ("coulomb_friction", ""), rich: ("stribeck_friction", ""), more: More::Breakaway },
-    Refinement { simple: ("coulomb_friction", "presliding"), rich: ("coulomb_friction", "bristles"), more: More::Samples(&[0.1, 1.0]) },
+    Refinement { simple: ("coulomb_friction", "presliding"), rich: ("coulomb_friction", "bristles"), more: More::Samples(&[0.5]) },
     Refinement { simple: ("coulomb_friction", "presliding"), rich: ("stribeck_friction", "presliding"), more: More::Breakaway },
-    Refinement { simple: ("input_saturation", ""), rich: ("input_saturation", "soft"), more: More::Numbers(&[4.0, 12.0]) },
-    Refinement { simple: ("sensor_saturation", ""), rich: ("sensor_saturation", "soft"), more: More::Numbers(&[4.0, 12.0]) },
+    Refinement { simple: ("input_saturation", ""), rich: ("input_saturation", "soft"), more: More::Numbers(&[8.0]) },
+    Refinement { simple: ("sensor_saturation", ""), rich: ("sensor_saturation", "soft"), more: More::Numbers(&[8.0]) },
     Refinement { simple: ("end_stop", "upper"), rich: ("end_stop", "upper damped"), more: More::Samples(&[0.5]) },
     Refinement { simple: ("end_stop", "lower"), rich: ("end_stop", "lower damped"), more: More::Samples(&[0.5]) },
     Refinement { simple: ("end_stop", "both"), rich: ("end_stop", "both damped"), more: More::Samples(&[0.5]) },
@@ -303,7 +311,7 @@ fn derived(
                 .collect(),
             More::Breakaway => {
                 let speed = speed_scale(problem, &best.fit, known);
-                [0.02, 0.1, 0.4].iter().map(|share| vec![0.4_f64.ln(), (share * speed).ln()]).collect()
+                [0.05, 0.3].iter().map(|share| vec![0.4_f64.ln(), (share * speed).ln()]).collect()
             }
         };
         for more in starts {
@@ -356,18 +364,57 @@ fn plant_may_stay(ranked: &Ranked, all: &[Ranked], known: usize) -> bool {
     let effect = &ranked.fit.structure.effects[known];
     all.iter()
         .filter(|other| {
-            let theirs = &other.fit.structure.effects[known];
-            other.fit.structure.plant_free
-                && std::ptr::eq(theirs.definition, effect.definition)
-                && theirs.channel == effect.channel
-                && theirs.signal == effect.signal
-                && theirs.direction == effect.direction
+            other.fit.structure.plant_free && other.fit.structure.effects[known].is_same(effect)
         })
         .all(|other| {
             let more = other.fit.free.saturating_sub(ranked.fit.free).max(1);
             let gained = ranked.fit.deviance - other.fit.deviance;
             ChiSquared::new(more as f64).map_or(true, |d| d.sf(gained.max(0.0)) > SAME_PLANT)
         })
+}
+
+/// Fits with the plant free for the best that stand beside the given plant only, so that they can be compared.
+fn add_free_twins(problem: &Problem, boring: &Boring, ranked: &mut Vec<Ranked>, known: usize, base: f64) {
+    let count = problem.count();
+    let lonely: Vec<Ranked> = ranked
+        .iter()
+        .filter(|r| {
+            let e = &r.fit.structure.effects[known];
+            !r.fit.structure.plant_free
+                && base - r.criterion > NEEDED
+                && !ranked.iter().any(|o| {
+                    o.fit.structure.plant_free && o.fit.structure.effects[known].is_same(e)
+                })
+        })
+        .cloned()
+        .collect();
+    let twins: Vec<Ranked> = lonely
+        .into_par_iter()
+        .filter_map(|r| {
+            let full = &boring.full.structure;
+            let mut structure = full.clone();
+            structure.effects = r.fit.structure.effects.clone();
+            let linear = r.fit.structure.effect_offset(known);
+            let mut theta = full.given();
+            if r.fit.structure.initial_free {
+                let from = full.coordinates.len();
+                let states = full.states() * full.initial.len();
+                theta[from..from + states].copy_from_slice(&r.fit.theta[..states]);
+            }
+            theta.extend_from_slice(&r.fit.theta[linear..]);
+            let fit = Fit::run(problem, structure, theta, Some(&r.fit.noise), Effort::RANK)?;
+            Some(Ranked {
+                criterion: fit.criterion(count),
+                fit,
+            })
+        })
+        .collect();
+    for mut twin in twins {
+        if sane(problem, &twin.fit, known) {
+            twin.criterion += penalty(&twin, known, base, count);
+            ranked.push(twin);
+        }
+    }
 }
 
 /// Physics that contradicts itself is no explanation.
@@ -541,9 +588,4 @@ const KINDS: &[&[&str]] = &[
 
 fn look_alikes(a: &str, b: &str) -> bool {
     KINDS.iter().any(|kind| kind.contains(&a) && kind.contains(&b))
-}
-
-/// Used by the search of a second effect.
-pub(crate) fn refit_with(problem: &Problem, structure: Structure, start: Vec<f64>) -> Option<Fit> {
-    fit_lead(problem, structure, start, Effort::RANK)
 }

@@ -201,21 +201,35 @@ fn kept<'a>(column: &'a [f64], mask: &'a [bool]) -> impl Iterator<Item = f64> + 
 
 /// `gain * (v[k] + ar[0] v[k-1] + ...)`, from rest.
 pub(crate) fn filter(ar: &[f64], v: &[f64], gain: f64) -> Vec<f64> {
-    let p = ar.len();
-    let mut out = Vec::with_capacity(v.len());
-    for k in 0..v.len().min(p) {
-        let mut e = v[k];
-        for (i, a) in ar.iter().enumerate().take(k) {
-            e += a * v[k - 1 - i];
-        }
-        out.push(gain * e);
+    macro_rules! dispatch {
+        ($($p:literal)*) => {
+            match ar.len() {
+                $($p => filter_of_order::<$p>(ar, v, gain),)*
+                _ => Vec::new(),
+            }
+        };
     }
-    for window in v.windows(p + 1).take(v.len().saturating_sub(p)) {
-        let mut e = window[p];
-        for (i, a) in ar.iter().enumerate() {
-            e += a * window[p - 1 - i];
+    debug_assert!(ar.len() <= MOST_ORDER);
+    dispatch!(0 1 2 3 4 5 6 7 8)
+}
+
+/// The same with the order known to the compiler.
+fn filter_of_order<const P: usize>(ar: &[f64], v: &[f64], gain: f64) -> Vec<f64> {
+    let mut coefficients = [0.0; P];
+    for (c, a) in coefficients.iter_mut().zip(ar) {
+        *c = gain * a;
+    }
+    let mut out = Vec::with_capacity(v.len());
+    for k in 0..v.len().min(P) {
+        let past: f64 = (0..k).map(|i| coefficients[i] * v[k - 1 - i]).sum();
+        out.push(gain * v[k] + past);
+    }
+    for window in v.windows(P + 1) {
+        let mut e = gain * window[P];
+        for i in 0..P {
+            e += coefficients[i] * window[P - 1 - i];
         }
-        out.push(gain * e);
+        out.push(e);
     }
     out
 }

@@ -50,7 +50,7 @@ struct SizedForce<'a, const N: usize> {
     rate: [f64; N],
     direction: [f64; N],
     position_gain: f64,
-    memory: [f64; 2],
+    memory: [f64; 3],
 }
 
 fn array<const N: usize>(values: &[f64]) -> [f64; N] {
@@ -95,7 +95,7 @@ fn sized<const N: usize>(
             rate: array(&force.rate),
             direction: array(&force.direction),
             position_gain: force.position.iter().zip(&force.direction).map(|(c, b)| c * b).sum(),
-            memory: [0.0; 2],
+            memory: [0.0; 3],
         })
         .collect();
     let mut outputs = vec![vec![0.0; samples]; plant.outputs];

@@ -63,39 +63,43 @@ pub(crate) struct Signals {
     pub rate: Vec<Vec<f64>>,
 }
 
-/// Screens the library (entries that `allowed` lets pass) around `basis` under `noise`; best first.
+/// Screens the library (entries that `allowed` lets pass) around `basis` under each of `noises`: a list each, best
+/// first.
 pub(crate) fn screen(
     problem: &Problem,
     basis: &mut Fit,
-    noise: &Noise,
+    noises: &[Noise],
     allowed: &dyn Fn(&Definition) -> bool,
-) -> Vec<Lead> {
+) -> Vec<Vec<Lead>> {
     let sensitivities = basis.sensitivities(problem);
-    let Some(bench) = Bench::new(problem, basis, noise, sensitivities) else {
+    let benches: Vec<Bench> = noises
+        .iter()
+        .filter_map(|noise| Bench::new(problem, basis, noise, sensitivities.clone()))
+        .collect();
+    let Some(bench) = benches.first() else {
         return Vec::new();
     };
+    // Responses do not depend on the noise model: they are computed once.
     let signals = bench.signals();
     let lines = bench.lines();
-    let mut leads: Vec<Lead> = Vec::new();
+    let mut lists: Vec<Vec<Lead>> = vec![Vec::new(); benches.len()];
     for definition in effects::library().filter(|d| allowed(d)) {
         for template in bench.templates(definition, &signals, &lines) {
-            for lead in bench.judge(&template) {
-                let same = leads.iter_mut().find(|l| {
-                    std::ptr::eq(l.instance.definition, lead.instance.definition)
-                        && l.instance.channel == lead.instance.channel
-                        && l.instance.signal == lead.instance.signal
-                        && l.instance.direction == lead.instance.direction
-                });
-                match same {
-                    Some(known) if known.gain >= lead.gain => {}
-                    Some(known) => *known = lead,
-                    None => leads.push(lead),
+            for (bench, leads) in benches.iter().zip(&mut lists) {
+                for lead in bench.judge(&template) {
+                    match leads.iter_mut().find(|l| l.instance.is_same(&lead.instance)) {
+                        Some(known) if known.gain >= lead.gain => {}
+                        Some(known) => *known = lead,
+                        None => leads.push(lead),
+                    }
                 }
             }
         }
     }
-    leads.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    leads
+    for leads in &mut lists {
+        leads.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    }
+    lists
 }
 
 impl<'a> Bench<'a> {
@@ -503,7 +507,7 @@ impl<'a> Bench<'a> {
     fn force(&self, law: effects::ForceLaw, shape: &[f64], signal: &Signals, segment: usize) -> Vec<f64> {
         let (x, v) = (&signal.position[segment], &signal.rate[segment]);
         let clock = self.clock(segment);
-        let mut memory = [0.0; 2];
+        let mut memory = [0.0; 3];
         let inputs = &self.data().segments[segment].inputs;
         (0..x.len())
             .map(|k| {

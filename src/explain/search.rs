@@ -13,11 +13,13 @@ const LEADS_EACH: usize = 6;
 /// Places of one effect that are fitted in full from each screening.
 const PLACES_EACH: usize = 2;
 
+/// A lead that promises less is not fitted: one step underrates what a fit reaches, but not by this much.
+const HOPELESS: f64 = -10.0;
 /// What a feedthrough must gain to be believed: strong evidence (Kass and Raftery 1995).
 const FEEDTHROUGH_GAIN: f64 = 10.0;
 /// Scouted fits that are pursued, and forms (places, plant free or not) of one effect among them.
-const PROMISING: usize = 16;
-const FORMS_EACH: usize = 4;
+const PROMISING: usize = 12;
+const FORMS_EACH: usize = 3;
 /// Second effects that are fitted beside each first.
 const SECONDS_EACH: usize = 4;
 
@@ -105,22 +107,28 @@ pub(crate) fn single_effects(
     let count = problem.count();
     let mut leads: Vec<(usize, Lead)> = Vec::new();
     let bases = [boring.frozen(count).clone(), boring.full.clone()];
-    let screens: Vec<(usize, Vec<Lead>)> = [(0, false), (0, true), (1, false), (1, true)]
+    let screens: Vec<(usize, Vec<Vec<Lead>>)> = [0, 1]
         .into_par_iter()
-        .map(|(index, white)| {
+        .map(|index| {
             let mut basis = bases[index].clone();
-            let noise = if white {
-                Noise::white(&basis.residual, problem.data.outputs, &problem.mask)
-            } else {
-                basis.noise.clone()
-            };
-            (index, screen(problem, &mut basis, &noise, allowed))
+            let noises = [
+                basis.noise.clone(),
+                Noise::white(&basis.residual, problem.data.outputs, &problem.mask),
+            ];
+            (index, screen(problem, &mut basis, &noises, allowed))
         })
         .collect();
-    for (index, list) in screens {
-        for lead in shortlist(list, LEADS_EACH, PLACES_EACH) {
-            leads.push((index, lead));
+    for (index, lists) in screens {
+        let mut own: Vec<Lead> = Vec::new();
+        for list in lists {
+            for lead in shortlist(list, LEADS_EACH, PLACES_EACH) {
+                // The second noise model often finds what the first has found.
+                if !own.iter().any(|l| l.instance.is_same(&lead.instance)) {
+                    own.push(lead);
+                }
+            }
         }
+        leads.extend(own.into_iter().map(|lead| (index, lead)));
     }
     // Every lead twice: beside the plant as given, and with the plant free. A few steps tell which deserve more.
     let frozen = boring.frozen(count);
@@ -181,7 +189,7 @@ pub(crate) fn single_effects(
 /// The best leads: so many effects, so many places of each.
 fn shortlist(leads: Vec<Lead>, effects: usize, places: usize) -> Vec<Lead> {
     let mut kept: Vec<Lead> = Vec::new();
-    for lead in leads {
+    for lead in leads.into_iter().filter(|l| l.gain > HOPELESS) {
         let id = lead.instance.definition.id;
         let same = kept.iter().filter(|l| l.instance.definition.id == id).count();
         let mut ids: Vec<&str> = kept.iter().map(|l| l.instance.definition.id).collect();
@@ -260,8 +268,9 @@ pub(crate) fn second_effects(
             let taken: Vec<&str> = basis.structure.effects.iter().map(|e| e.definition.id).collect();
             let noise = basis.noise.clone();
             let other = |d: &Definition| allowed(d) && !taken.contains(&d.id) && d.id != "extra_mode";
-            shortlist(screen(problem, &mut basis, &noise, &other), SECONDS_EACH, 1)
+            screen(problem, &mut basis, &[noise], &other)
                 .into_iter()
+                .flat_map(|list| shortlist(list, SECONDS_EACH, 1))
                 .map(move |lead| (index, lead))
         })
         .collect();

@@ -46,6 +46,14 @@ pub(crate) struct Instance {
 }
 
 impl Instance {
+    /// Whether it is the same effect at the same place.
+    pub fn is_same(&self, other: &Self) -> bool {
+        std::ptr::eq(self.definition, other.definition)
+            && self.channel == other.channel
+            && self.signal == other.signal
+            && self.direction == other.direction
+    }
+
     /// Numbers before the shape parameters: amplitude or direction of a force.
     pub fn amplitudes(&self, states: usize) -> usize {
         match (self.definition.action, self.direction) {

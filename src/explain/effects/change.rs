@@ -44,6 +44,6 @@ fn gain(p: &[f64], u: &mut [f64], _: &mut [f64], clock: &Clock) {
     }
 }
 
-fn stiffness(p: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn stiffness(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     -motion.middle() * motion.clock.share_after(motion.sample, p[0])
 }

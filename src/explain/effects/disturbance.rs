@@ -89,6 +89,6 @@ fn sine(p: &[f64], y: &mut [f64], clock: &Clock) {
     }
 }
 
-fn step(p: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn step(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     motion.clock.share_after(motion.sample, p[0])
 }

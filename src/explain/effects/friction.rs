@@ -151,28 +151,28 @@ fn no_shape(_: &Observed) -> Vec<Vec<f64>> {
     vec![vec![]]
 }
 
-fn coulomb(_: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn coulomb(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     motion.stopping_force(1.0)
 }
 
 /// Dahl's law ([`bristle_force`] without damping).
-fn bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 2]) -> f64 {
+fn bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 3]) -> f64 {
     bristle_force(1.0, p[0], 0.0, motion, memory)
 }
 
 /// Bristles with damping of their own: LuGre friction (Canudas de Wit et al. 1995) of constant strength.
-fn damped_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 2]) -> f64 {
+fn damped_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 3]) -> f64 {
     bristle_force(1.0, p[0], p[1], motion, memory)
 }
 
 /// [`bristle`] whose strength falls with the speed.
-fn breakaway_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 2]) -> f64 {
+fn breakaway_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 3]) -> f64 {
     let slow = motion.middle_rate() / p[2];
     bristle_force(1.0 + p[1] * (-slow * slow).exp(), p[0], 0.0, motion, memory)
 }
 
 /// LuGre friction.
-fn damped_breakaway_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 2]) -> f64 {
+fn damped_breakaway_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 3]) -> f64 {
     let slow = motion.middle_rate() / p[3];
     bristle_force(1.0 + p[2] * (-slow * slow).exp(), p[0], p[1], motion, memory)
 }
@@ -181,54 +181,41 @@ fn damped_breakaway_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 2]) -
 ///
 /// The deflection follows the position exactly (its law integrates in closed form over a monotone move), at the
 /// position in the middle of the interval that the force brings about itself: stiff bristles would be unstable
-/// otherwise. Memory: deflection in units of the largest, and the position it was last updated at.
-fn bristle_force(strength: f64, distance: f64, time: f64, motion: &Motion, memory: &mut [f64; 2]) -> f64 {
+/// otherwise. Memory: deflection in units of the largest, the position it was last updated at, and the
+/// last force.
+fn bristle_force(strength: f64, distance: f64, time: f64, motion: &Motion, memory: &mut [f64; 3]) -> f64 {
     if motion.sample == 0 {
         memory[1] = motion.position;
     }
-    let (before, from) = (memory[0], memory[1]);
+    let (before, from, last) = (memory[0], memory[1], memory[2]);
     let free = motion.middle();
-    let deflected = |at: f64| {
-        let moved = at - from;
-        let side = moved.signum();
-        side - (side - before) * (-moved.abs() / distance).exp()
-    };
     let damping = time / motion.clock.step;
-    let force = |at: f64| {
-        let z = deflected(at);
-        z + damping * (z - before)
-    };
-    // force(free - gain f) - f falls with f: its root lies between 0 and force(free), and bisection by the secant
-    // (Illinois) finds it in a few steps.
     let gain = (0.5 * motion.position_gain * strength).max(0.0);
-    let excess = |f: f64| force(free - gain * f) - f;
-    let (mut a, mut b) = (0.0, force(free));
-    let (mut at_a, mut at_b) = (b, excess(b));
-    let mut f = b;
-    for _ in 0..6 {
-        if (b - a).abs() < 1e-6 || at_a == at_b {
+    // force(free - gain f) - f falls monotonically with f: Newton's steps from the last force.
+    let mut f = last;
+    let mut z = before;
+    for _ in 0..4 {
+        let moved = free - gain * f - from;
+        let side = moved.signum();
+        z = side - (side - before) * (-moved.abs() / distance).exp();
+        let excess = z + damping * (z - before) - f;
+        let slope = 1.0 + gain * (1.0 + damping) * (1.0 - side * z) / distance;
+        let step = excess / slope;
+        f += step;
+        if step.abs() < 1e-5 {
             break;
         }
-        f = b - at_b * (b - a) / (at_b - at_a);
-        let at_f = excess(f);
-        if at_f * at_b < 0.0 {
-            (a, at_a) = (b, at_b);
-        } else {
-            at_a *= 0.5;
-        }
-        (b, at_b) = (f, at_f);
     }
-    let at = free - gain * f;
-    *memory = [deflected(at).clamp(-1.0, 1.0), at];
+    *memory = [z.clamp(-1.0, 1.0), free - gain * f, f];
     -strength * f
 }
 
-fn stribeck(p: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn stribeck(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     let slow = motion.middle_rate() / p[1];
     motion.stopping_force(1.0 + p[0] * (-slow * slow).exp())
 }
 
-fn drag(_: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn drag(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     let v = motion.middle_rate();
     -v * v.abs()
 }

@@ -127,7 +127,7 @@ pub(crate) type ChannelLaw = fn(parameters: &[f64], channel: &mut [f64], clock: 
 /// interval, `int (s - h/2) u(s) ds / h^2`, for laws that do not hold their value over the interval.
 pub(crate) type InputLaw = fn(parameters: &[f64], mean: &mut [f64], moment: &mut [f64], clock: &Clock);
 /// Force of unit amplitude over one sample; the memory is the effect's own state.
-pub(crate) type ForceLaw = fn(parameters: &[f64], motion: &Motion, memory: &mut [f64; 2]) -> f64;
+pub(crate) type ForceLaw = fn(parameters: &[f64], motion: &Motion, memory: &mut [f64; 3]) -> f64;
 /// Starting values of the shape parameters, from what the simulation says the channel does.
 pub(crate) type Starts = fn(&Observed) -> Vec<Vec<f64>>;
 

@@ -179,34 +179,34 @@ fn no_shape(_: &Observed) -> Vec<Vec<f64>> {
     vec![vec![]]
 }
 
-fn cubic(_: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn cubic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     let x = motion.middle();
     -x * x * x
 }
 
-fn odd_quadratic(_: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn odd_quadratic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     let x = motion.middle();
     -x * x.abs()
 }
 
-fn even_quadratic(_: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn even_quadratic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     let x = motion.middle();
     -x * x
 }
 
-fn input_times_position(_: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn input_times_position(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     motion.middle() * motion.input
 }
 
-fn upper_stop(p: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn upper_stop(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     -(motion.middle() - p[0]).max(0.0)
 }
 
-fn lower_stop(p: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn lower_stop(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     (p[0] - motion.middle()).max(0.0)
 }
 
-fn both_stops(p: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn both_stops(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     let x = motion.middle();
     x.clamp(-p[0], p[0]) - x
 }
@@ -220,15 +220,15 @@ fn contact(depth: f64, speed: f64, time: f64) -> f64 {
     }
 }
 
-fn upper_contact(p: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn upper_contact(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     -contact(motion.middle() - p[0], motion.middle_rate(), p[1])
 }
 
-fn lower_contact(p: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn lower_contact(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     contact(p[0] - motion.middle(), -motion.middle_rate(), p[1])
 }
 
-fn both_contacts(p: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
+fn both_contacts(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     let (x, v) = (motion.middle(), motion.middle_rate());
     contact(-p[0] - x, -v, p[1]) - contact(x - p[0], v, p[1])
 }
@@ -237,7 +237,7 @@ fn both_contacts(p: &[f64], motion: &Motion, _: &mut [f64; 2]) -> f64 {
 const HYSTERESIS_STEPS: usize = 4;
 
 /// Memory: the hysteretic variable in `[-1, 1]`, and the position it was last updated at.
-fn bouc_wen(p: &[f64], motion: &Motion, memory: &mut [f64; 2]) -> f64 {
+fn bouc_wen(p: &[f64], motion: &Motion, memory: &mut [f64; 3]) -> f64 {
     let at = motion.middle();
     if motion.sample == 0 {
         memory[1] = motion.position;
@@ -249,7 +249,7 @@ fn bouc_wen(p: &[f64], motion: &Motion, memory: &mut [f64; 2]) -> f64 {
         z += step * (1.0 - z.abs() * (p[1] * loading + 1.0 - p[1]));
         z = z.clamp(-1.0, 1.0);
     }
-    *memory = [z, at];
+    *memory = [z, at, 0.0];
     -z
 }
 
