@@ -98,22 +98,21 @@ impl Answer<'_> {
         let finding = self.finding;
         let problem = self.problem();
         let count = finding.count;
-        let known = self.known.structure.effects.len();
         let boring = finding.boring.best(count);
         let model = &finding.model;
         let shown = self.output_that_shows(boring, model);
         let (input_names, output_names) = self.names();
         let squares = locate::excess(&boring.residual, &model.noise);
-        let effects = self.effects(&problem, model, known);
+        let effects = self.effects(&problem, model);
         let (fit, effect_size, heldout_gain) = self.proof(&problem, boring, model, shown);
         let mut effects = effects;
         if let Some(first) = effects.first_mut() {
             first.evidence.heldout_gain = heldout_gain;
         }
         let verdict = finding.verdict;
-        let location = self.location(&squares, boring, model, known, shown, (&input_names, &output_names));
-        let alternatives = self.alternatives(known);
-        let separating_experiment = self.experiment(known);
+        let location = self.location(&squares, boring, model, shown, (&input_names, &output_names));
+        let alternatives = self.alternatives();
+        let separating_experiment = self.experiment();
         let mut augmented = AugmentedModel::describe(
             &model.structure,
             &model.theta,
@@ -138,7 +137,7 @@ impl Answer<'_> {
         let mut explanation = Explanation {
             format: EXPLANATION_FORMAT.to_owned(),
             verdict,
-            probability: probability(finding, known),
+            probability: probability(finding),
             summary: Vec::new(),
             effects: if verdict == Verdict::Unexplained { Vec::new() } else { effects },
             alternatives,
@@ -191,11 +190,11 @@ impl Answer<'_> {
         }
     }
 
-    fn effects(&self, problem: &Problem, model: &Fit, known: usize) -> Vec<EffectFound> {
+    fn effects(&self, problem: &Problem, model: &Fit) -> Vec<EffectFound> {
         let mut fit = model.clone();
         let covariance = fit.covariance(problem);
         let mut found = Vec::new();
-        for index in known..model.structure.effects.len() {
+        for index in model.structure.first_new()..model.structure.effects.len() {
             let effect = &model.structure.effects[index];
             let definition = effect.definition;
             let signal = self.signal_name(effect);
@@ -424,7 +423,6 @@ impl Answer<'_> {
         squares: &Series,
         boring: &Fit,
         model: &Fit,
-        known: usize,
         shown: usize,
         names: (&[String], &[String]),
     ) -> Location {
@@ -459,7 +457,7 @@ impl Answer<'_> {
             let at = |k: usize| data.segments[freeze.segment].start_time + k as f64 * data.sample_time;
             time.push([at(freeze.from), at(freeze.to), 1.0]);
         }
-        for index in known..model.structure.effects.len() {
+        for index in model.structure.first_new()..model.structure.effects.len() {
             let effect = &model.structure.effects[index];
             let shape = model.structure.shape(&model.theta, index);
             if let Some(at) = effect.definition.parameters.iter().position(|p| p.name == "from") {
@@ -471,8 +469,8 @@ impl Answer<'_> {
         }
         let before = locate::spectrum(&boring.residual, l, shown, data.sample_time);
         let after = locate::spectrum(&model.residual, l, shown, data.sample_time);
-        let port = (model.structure.effects.len() > known).then(|| {
-            match model.structure.effects[known].definition.port() {
+        let port = (!model.structure.new_effects().is_empty()).then(|| {
+            match model.structure.new_effects()[0].definition.port() {
                 Port::Input | Port::Path => "input",
                 Port::Force => "inside",
                 Port::Sensor | Port::Exact => "output",
@@ -493,8 +491,8 @@ impl Answer<'_> {
         }
     }
 
-    fn alternatives(&self, known: usize) -> Vec<Alternative> {
-        let named: Vec<&str> = self.finding.model.structure.effects[known..].iter().map(|e| e.definition.id).collect();
+    fn alternatives(&self) -> Vec<Alternative> {
+        let named: Vec<&str> = self.finding.model.structure.new_effects().iter().map(|e| e.definition.id).collect();
         let gain = self.finding.gain;
         let unexplained = self.finding.verdict == Verdict::Unexplained;
         self.finding
@@ -529,11 +527,11 @@ impl Answer<'_> {
             .collect()
     }
 
-    fn experiment(&self, known: usize) -> Option<String> {
+    fn experiment(&self) -> Option<String> {
         let best = self.finding.rivals.first()?;
         match self.finding.verdict {
             Verdict::Family => {
-                let named = self.finding.model.structure.effects.get(known)?.definition;
+                let named = self.finding.model.structure.new_effects().first()?.definition;
                 let rival = self.finding.rivals.iter().find(|r| r.definition.id != named.id)?;
                 named
                     .mimics
@@ -616,7 +614,7 @@ impl Answer<'_> {
     fn parameter_changes(&self, boring: &Fit) -> Vec<ParameterChange> {
         let fit = if self.finding.model.structure.plant_free { &self.finding.model } else { boring };
         if !fit.structure.plant_free {
-            return Vec::new();
+            return self.adjustments(fit);
         }
         let system = |plant: &super::plant::Plant| {
             StateSpace::deterministic(plant.a_matrix(), plant.b_matrix(), plant.c_matrix(), plant.d_matrix(), plant.sample_time).ok()
@@ -671,6 +669,36 @@ impl Answer<'_> {
         }
         changes.retain(|c| c.simulation.is_finite() && c.recording.is_finite());
         changes
+    }
+
+    /// Single numbers that were adjusted beside the plant as given.
+    fn adjustments(&self, fit: &Fit) -> Vec<ParameterChange> {
+        let structure = &fit.structure;
+        (structure.known.len()..structure.first_new())
+            .map(|index| {
+                let effect = &structure.effects[index];
+                let number = structure.effect_numbers(&fit.theta, index)[0];
+                let (input, output) = self.channels_of(effect);
+                let unit = |of: &str| match (&input.unit, &output.unit) {
+                    (Some(i), Some(o)) => format!("{i}/({o}{of})"),
+                    _ => String::new(),
+                };
+                match effect.definition.id {
+                    "input_gain" => ParameterChange {
+                        name: format!("gain of {}, relative", input.name),
+                        simulation: 1.0,
+                        recording: 1.0 + number,
+                        unit: String::new(),
+                    },
+                    id => ParameterChange {
+                        name: format!("additional {} at {}", id.trim_start_matches("linear_"), output.name),
+                        simulation: 0.0,
+                        recording: number,
+                        unit: unit(if id == "linear_damping" { "/s" } else { "" }),
+                    },
+                }
+            })
+            .collect()
     }
 
     fn signals(&self, boring: &Fit, model: &Fit) -> Vec<SignalTraces> {

@@ -314,6 +314,7 @@ impl AugmentedModel {
             feedthrough_free: false,
             effects: instances,
             known,
+            adjusted: 0,
         })
     }
 }

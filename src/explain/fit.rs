@@ -109,6 +109,13 @@ impl Fit {
         self.deviance + (self.free as f64) * (count.max(2) as f64).ln()
     }
 
+    /// Becomes `other` if that has the lesser criterion.
+    pub fn better_of(&mut self, other: Self, count: usize) {
+        if other.criterion(count) < self.criterion(count) {
+            *self = other;
+        }
+    }
+
     /// Simulates the structure at `theta` and takes its noise model, without any fitting.
     pub fn at(problem: &Problem, structure: Structure, theta: Vec<f64>) -> Option<Self> {
         let simulated = structure.simulate(&theta, problem.data)?;

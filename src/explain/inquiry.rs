@@ -112,24 +112,23 @@ pub(crate) fn inquire(
     if dominated || coarse.is_some_and(|c| c.2 > 0.3) {
         // Rounding is most of what is left: it is the answer, and its error would be taken for anything.
         finding.verdict = Verdict::Named;
-        finding.model = finding.boring.frozen(count).clone();
+        finding.model = finding.boring.near.clone();
         return Some((finding, problem.mask));
     }
-    let known = structure.effects.len();
     let mut ranked = single_effects(&problem, &finding.boring, allowed);
     for refinements in [REFINEMENTS, FURTHER] {
-        ranked.extend(derived(&problem, refinements, &ranked, known, base, allowed));
+        ranked.extend(derived(&problem, refinements, &ranked, base, allowed));
     }
     for r in &mut ranked {
-        r.criterion += penalty(r, known, base, count);
+        r.criterion += penalty(r, base, count);
     }
-    ranked.retain(|r| sane(&problem, &r.fit, known));
-    add_free_twins(&problem, &finding.boring, &mut ranked, known, base);
+    ranked.retain(|r| sane(&problem, &r.fit));
+    add_free_twins(&problem, &finding.boring, &mut ranked, base);
     let ranked_all = ranked.clone();
-    ranked.retain(|r| plant_may_stay(r, &ranked_all, known));
+    ranked.retain(|r| plant_may_stay(r, &ranked_all));
     ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
-    finding.rivals = rivals(&ranked, known, base);
-    finding.detectable = detectable(&problem, &ranked, known);
+    finding.rivals = rivals(&ranked, base);
+    finding.detectable = detectable(&problem, &ranked);
     let needed = NEEDED;
     let best = ranked.first().filter(|r| base - r.criterion > needed);
     if let Some(best) = best {
@@ -140,7 +139,7 @@ pub(crate) fn inquire(
         let second = if nothing_left {
             None
         } else {
-            pair(&problem, &ranked_all, known, base, allowed)
+            pair(&problem, &ranked_all, base, allowed)
         };
         if let Some(pair) = second {
             let polished = polished(&problem, &pair);
@@ -156,8 +155,8 @@ pub(crate) fn inquire(
         } else if finding
             .rivals
             .iter()
-            .any(|r| r.definition.id != fit.structure.effects[known].definition.id && gain - r.gain < TIE)
-            && fit.structure.effects.len() == known + 1
+            .any(|r| r.definition.id != fit.structure.new_effects()[0].definition.id && gain - r.gain < TIE)
+            && fit.structure.new_effects().len() == 1
         {
             Verdict::Family
         } else {
@@ -198,8 +197,8 @@ fn coarse_sensor(problem: &Problem, fit: &Fit) -> Option<(usize, f64, f64)> {
 }
 
 /// What some effects owe beyond the count of their parameters.
-fn penalty(ranked: &Ranked, known: usize, base: f64, count: usize) -> f64 {
-    let Some(effect) = ranked.fit.structure.effects.get(known) else {
+fn penalty(ranked: &Ranked, base: f64, count: usize) -> f64 {
+    let Some(effect) = ranked.fit.structure.new_effects().first() else {
         return 0.0;
     };
     let changes = effect.definition.parameters.iter().any(|p| p.name == "from" && p.unit == Unit::Second);
@@ -212,7 +211,7 @@ fn penalty(ranked: &Ranked, known: usize, base: f64, count: usize) -> f64 {
         // A frequency is chosen among all bins: it counts about twice (Djuric 1996, 3 ln N for a sinusoid).
         owed += (count as f64).ln();
     }
-    if effect.definition.id == "hysteresis" && pulls(&ranked.fit, known) {
+    if effect.definition.id == "hysteresis" && pulls(&ranked.fit, ranked.fit.structure.first_new()) {
         owed += UNUSUAL;
     }
     let gain = (base - ranked.criterion).max(0.0);
@@ -273,7 +272,6 @@ fn derived(
     problem: &Problem,
     refinements: &[Refinement],
     ranked: &[Ranked],
-    known: usize,
     base: f64,
     allowed: &(dyn Fn(&Definition) -> bool + Sync),
 ) -> Vec<Ranked> {
@@ -292,7 +290,7 @@ fn derived(
         };
         let mut simple_fits: Vec<&Ranked> = ranked
             .iter()
-            .filter(|r| std::ptr::eq(r.fit.structure.effects[known].definition, simple))
+            .filter(|r| std::ptr::eq(r.fit.structure.new_effects()[0].definition, simple))
             .collect();
         simple_fits.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
         let best = match refinement.more {
@@ -310,13 +308,14 @@ fn derived(
                 .map(|v| vec![(v * problem.data.sample_time).ln()])
                 .collect(),
             More::Breakaway => {
-                let speed = speed_scale(problem, &best.fit, known);
+                let speed = speed_scale(problem, &best.fit, best.fit.structure.first_new());
                 [0.05, 0.3].iter().map(|share| vec![0.4_f64.ln(), (share * speed).ln()]).collect()
             }
         };
         for more in starts {
             let mut structure = best.fit.structure.clone();
-            structure.effects[known].definition = rich;
+            let at = structure.first_new();
+            structure.effects[at].definition = rich;
             let mut theta = best.fit.theta.clone();
             theta.extend(more);
             jobs.push((structure, theta, best.fit.noise.clone()));
@@ -357,14 +356,14 @@ fn pulls(fit: &Fit, index: usize) -> bool {
 
 /// An effect fitted beside the given plant stands only while a free plant does not do significantly better with the
 /// same effect: else the effect makes up for wrong parameters (math/explain.md, choice 5).
-fn plant_may_stay(ranked: &Ranked, all: &[Ranked], known: usize) -> bool {
+fn plant_may_stay(ranked: &Ranked, all: &[Ranked]) -> bool {
     if ranked.fit.structure.plant_free {
         return true;
     }
-    let effect = &ranked.fit.structure.effects[known];
+    let effect = &ranked.fit.structure.new_effects()[0];
     all.iter()
         .filter(|other| {
-            other.fit.structure.plant_free && other.fit.structure.effects[known].is_same(effect)
+            other.fit.structure.plant_free && other.fit.structure.new_effects()[0].is_same(effect)
         })
         .all(|other| {
             let more = other.fit.free.saturating_sub(ranked.fit.free).max(1);
@@ -374,16 +373,16 @@ fn plant_may_stay(ranked: &Ranked, all: &[Ranked], known: usize) -> bool {
 }
 
 /// Fits with the plant free for the best that stand beside the given plant only, so that they can be compared.
-fn add_free_twins(problem: &Problem, boring: &Boring, ranked: &mut Vec<Ranked>, known: usize, base: f64) {
+fn add_free_twins(problem: &Problem, boring: &Boring, ranked: &mut Vec<Ranked>, base: f64) {
     let count = problem.count();
     let lonely: Vec<Ranked> = ranked
         .iter()
         .filter(|r| {
-            let e = &r.fit.structure.effects[known];
+            let e = &r.fit.structure.new_effects()[0];
             !r.fit.structure.plant_free
                 && base - r.criterion > NEEDED
                 && !ranked.iter().any(|o| {
-                    o.fit.structure.plant_free && o.fit.structure.effects[known].is_same(e)
+                    o.fit.structure.plant_free && o.fit.structure.new_effects()[0].is_same(e)
                 })
         })
         .cloned()
@@ -393,8 +392,8 @@ fn add_free_twins(problem: &Problem, boring: &Boring, ranked: &mut Vec<Ranked>, 
         .filter_map(|r| {
             let full = &boring.full.structure;
             let mut structure = full.clone();
-            structure.effects = r.fit.structure.effects.clone();
-            let linear = r.fit.structure.effect_offset(known);
+            structure.effects.extend_from_slice(r.fit.structure.new_effects());
+            let linear = r.fit.structure.effect_offset(r.fit.structure.first_new());
             let mut theta = full.given();
             if r.fit.structure.initial_free {
                 let from = full.coordinates.len();
@@ -410,18 +409,18 @@ fn add_free_twins(problem: &Problem, boring: &Boring, ranked: &mut Vec<Ranked>, 
         })
         .collect();
     for mut twin in twins {
-        if sane(problem, &twin.fit, known) {
-            twin.criterion += penalty(&twin, known, base, count);
+        if sane(problem, &twin.fit) {
+            twin.criterion += penalty(&twin, base, count);
             ranked.push(twin);
         }
     }
 }
 
 /// Physics that contradicts itself is no explanation.
-fn sane(problem: &Problem, fit: &Fit, known: usize) -> bool {
+fn sane(problem: &Problem, fit: &Fit) -> bool {
     let plant = fit.structure.plant(&fit.theta);
     let rows = Functionals::new(&plant);
-    (known..fit.structure.effects.len()).all(|index| {
+    (fit.structure.first_new()..fit.structure.effects.len()).all(|index| {
         let effect = &fit.structure.effects[index];
         let shape = fit.structure.shape(&fit.theta, index);
         if let Action::Force(_, _, sense) = effect.definition.action {
@@ -493,17 +492,18 @@ fn travel(problem: &Problem, fit: &Fit, index: usize) -> f64 {
 
 /// For each effect that was fitted: the size in the output at which its evidence would have sufficed. The evidence
 /// grows with the square of the size, and the fit's own size has an evidence of its deviance.
-fn detectable(problem: &Problem, ranked: &[Ranked], known: usize) -> Vec<(&'static Definition, super::structure::Instance, f64)> {
+fn detectable(problem: &Problem, ranked: &[Ranked]) -> Vec<(&'static Definition, super::structure::Instance, f64)> {
     let mut list: Vec<(&'static Definition, super::structure::Instance, f64)> = Vec::new();
     for r in ranked {
-        let instance = r.fit.structure.effects[known];
+        let instance = r.fit.structure.new_effects()[0];
         if list.iter().any(|l| l.0.id == instance.definition.id) {
             continue;
         }
         // The same numbers without the effect.
         let mut without = r.fit.structure.clone();
-        let theta = r.fit.theta[..without.effect_offset(known)].to_vec();
-        without.effects.truncate(known);
+        let at = without.first_new();
+        let theta = r.fit.theta[..without.effect_offset(at)].to_vec();
+        without.effects.truncate(at);
         let Some(simulated) = without.simulate(&theta, problem.data) else {
             continue;
         };
@@ -518,10 +518,10 @@ fn detectable(problem: &Problem, ranked: &[Ranked], known: usize) -> Vec<(&'stat
 }
 
 /// One line an effect: the best of its forms.
-fn rivals(ranked: &[Ranked], known: usize, base: f64) -> Vec<Rival> {
+fn rivals(ranked: &[Ranked], base: f64) -> Vec<Rival> {
     let mut list: Vec<Rival> = Vec::new();
     for r in ranked {
-        let definition = r.fit.structure.effects[known].definition;
+        let definition = r.fit.structure.new_effects()[0].definition;
         if list.iter().all(|l| l.definition.id != definition.id) {
             list.push(Rival {
                 definition,
@@ -543,7 +543,6 @@ fn polished(problem: &Problem, fit: &Fit) -> Fit {
 fn pair(
     problem: &Problem,
     ranked: &[Ranked],
-    known: usize,
     base: f64,
     allowed: &(dyn Fn(&Definition) -> bool + Sync),
 ) -> Option<Fit> {
@@ -551,7 +550,7 @@ fn pair(
     let mut ranked = ranked.to_vec();
     ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     let best = ranked.first()?;
-    let id = |r: &Ranked| r.fit.structure.effects[known].definition.id;
+    let id = |r: &Ranked| r.fit.structure.new_effects()[0].definition.id;
     // The two best effects, each with the plant free and as given: a free plant may hide the second effect.
     let mut firsts: Vec<&Ranked> = Vec::new();
     let second = ranked.iter().find(|r| id(r) != id(best));
@@ -565,13 +564,13 @@ fn pair(
     if std::env::var_os("PAIRS").is_some() {
         for r in found.iter().take(8) {
             let v = |f: &Fit| f.residual.iter().flatten().map(|e| e * e).sum::<f64>() / count as f64;
-            eprintln!("pair {:.1} of {single_gain:.1} v1 {:.4e} v2 {:.4e} {:?}", best.criterion - r.criterion, v(&best.fit), v(&r.fit), r.fit.structure.effects[known..].iter().map(|e| (e.definition.id, e.definition.variant)).collect::<Vec<_>>());
+            eprintln!("pair {:.1} of {single_gain:.1} v1 {:.4e} v2 {:.4e} {:?}", best.criterion - r.criterion, v(&best.fit), v(&r.fit), r.fit.structure.new_effects().iter().map(|e| (e.definition.id, e.definition.variant)).collect::<Vec<_>>());
         }
     }
     let found = found
         .into_iter()
-        .filter(|r| !look_alikes(r.fit.structure.effects[known].definition.id, r.fit.structure.effects[known + 1].definition.id))
-        .filter(|r| sane(problem, &r.fit, known))
+        .filter(|r| !look_alikes(r.fit.structure.new_effects()[0].definition.id, r.fit.structure.new_effects()[1].definition.id))
+        .filter(|r| sane(problem, &r.fit))
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
     let gain = best.criterion - found.fit.criterion(count);
     (gain > SECOND_GAIN.max(SECOND_SHARE * single_gain)).then_some(found.fit)

@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::effects::{Definition, Unit};
+use super::effects::{self, Definition, Unit};
 use super::fit::{Effort, Fit, Problem};
 use super::noise::Noise;
 use super::screen::{Lead, extended, screen};
-use super::structure::Structure;
+use super::structure::{Direction, Functionals, Instance, Signal, Structure};
 
 /// Effects that are fitted in full from each screening.
 const LEADS_EACH: usize = 6;
@@ -15,80 +15,137 @@ const PLACES_EACH: usize = 2;
 
 /// A lead that promises less is not fitted: one step underrates what a fit reaches, but not by this much.
 const HOPELESS: f64 = -10.0;
-/// What a feedthrough must gain to be believed: strong evidence (Kass and Raftery 1995).
-const FEEDTHROUGH_GAIN: f64 = 10.0;
 /// Scouted fits that are pursued, and forms (places, plant free or not) of one effect among them.
 const PROMISING: usize = 12;
 const FORMS_EACH: usize = 3;
 /// Second effects that are fitted beside each first.
 const SECONDS_EACH: usize = 4;
 
-/// The explanations without new physics, each nested in the next.
+/// The explanations without new physics.
 #[derive(Debug, Clone)]
 pub(crate) struct Boring {
     /// The simulation as it was given.
     pub given: Fit,
-    /// With other initial states.
-    pub initial: Fit,
+    /// With other initial states, if the criterion allows.
+    pub strict: Fit,
+    /// The plant as given, with what the criterion allows of other initial states, gains, stiffness and damping.
+    pub near: Fit,
     /// With other parameters and initial states.
     pub full: Fit,
 }
 
 impl Boring {
-    /// All three around `structure`, the simulation as it is known.
+    /// All of them around `structure`, the simulation as it is known.
     pub fn fit(problem: &Problem, structure: &Structure) -> Option<Self> {
-        let structure = |plant_free, initial_free| Structure {
-            plant_free,
-            initial_free,
-            ..structure.clone()
-        };
-        let fit = |structure: Structure| {
+        let count = problem.count();
+        let fit = |structure: Structure, theta: Vec<f64>| Fit::run(problem, structure, theta, None, Effort::FINAL);
+        let with = |plant_free, initial_free| {
+            let structure = Structure {
+                plant_free,
+                initial_free,
+                ..structure.clone()
+            };
             let theta = structure.given();
-            Fit::run(problem, structure, theta, None, Effort::FINAL)
+            (structure, theta)
         };
+        let run = |(structure, theta)| fit(structure, theta);
+        let (given, (initial, full)) = rayon::join(
+            || run(with(false, false)),
+            || rayon::join(|| run(with(false, true)), || run(with(true, true))),
+        );
+        let (given, full) = (given?, full?);
+        let mut near = given.clone();
+        near.better_of(initial?, count);
+        let strict = near.clone();
+        let adjusted: Vec<Fit> = adjustments(problem, structure)
+            .into_par_iter()
+            .filter_map(|list| {
+                let mut structure = near.structure.clone();
+                structure.adjusted = list.len();
+                let mut theta = near.theta.clone();
+                theta.extend(list.iter().flat_map(|i| vec![0.0; i.len(structure.states(), structure.outputs())]));
+                structure.effects.extend(list);
+                fit(structure, theta)
+            })
+            .collect();
+        for candidate in adjusted {
+            near.better_of(candidate, count);
+        }
         Some(Self {
-            given: fit(structure(false, false))?,
-            initial: fit(structure(false, true))?,
-            full: {
-                let plain = fit(structure(true, true))?;
-                let count = problem.count();
-                let with_feedthrough = Structure {
-                    feedthrough_free: true,
-                    ..structure(true, true)
-                };
-                let start = {
-                    let mut theta = plain.theta.clone();
-                    let given = &with_feedthrough.coordinates.given;
-                    let at = plain.structure.linear_len();
-                    let column = |input: usize| (0..given.outputs).map(move |o| given.d[o * given.inputs + input]);
-                    let d: Vec<f64> = with_feedthrough.coordinates.active_inputs.iter().flat_map(|j| column(*j)).collect();
-                    theta.splice(at..at, d);
-                    theta
-                };
-                match Fit::run(problem, with_feedthrough, start, Some(&plain.noise), Effort::FINAL) {
-                    Some(direct) if direct.criterion(count) < plain.criterion(count) - FEEDTHROUGH_GAIN => direct,
-                    _ => plain,
-                }
-            },
+            given,
+            strict,
+            near,
+            full,
         })
     }
 
     /// The one with the least criterion.
     pub fn best(&self, count: usize) -> &Fit {
-        [&self.given, &self.initial, &self.full]
-            .into_iter()
-            .min_by(|a, b| a.criterion(count).total_cmp(&b.criterion(count)))
-            .unwrap_or(&self.given)
-    }
-
-    /// The frozen one with the least criterion: the plant as it was given.
-    pub fn frozen(&self, count: usize) -> &Fit {
-        if self.initial.criterion(count) < self.given.criterion(count) {
-            &self.initial
+        if self.full.criterion(count) < self.near.criterion(count) {
+            &self.full
         } else {
-            &self.given
+            &self.near
         }
     }
+}
+
+/// Most numbers that are adjusted together.
+const MOST_ADJUSTED: usize = 6;
+
+/// Sets of adjustments that are tried: gains; gains, stiffness and damping.
+fn adjustments(problem: &Problem, structure: &Structure) -> Vec<Vec<Instance>> {
+    let (Some(gain), Some(stiffness), Some(damping)) = (
+        effects::find("input_gain", ""),
+        effects::find("linear_stiffness", ""),
+        effects::find("linear_damping", ""),
+    ) else {
+        return Vec::new();
+    };
+    let plant = &structure.coordinates.given;
+    let rows = Functionals::new(plant);
+    let inputs: Vec<usize> = structure
+        .coordinates
+        .active_inputs
+        .iter()
+        .copied()
+        .filter(|j| *j < problem.data.signals())
+        .collect();
+    let gains: Vec<Instance> = inputs
+        .iter()
+        .map(|&channel| Instance {
+            definition: gain,
+            channel,
+            signal: Signal::Output(0),
+            direction: Direction::Matched(channel),
+        })
+        .collect();
+    let mut forces = Vec::new();
+    for output in 0..plant.outputs {
+        let signal = if rows.integrates(plant, output) {
+            Signal::Integral(output)
+        } else {
+            Signal::Output(output)
+        };
+        for &input in &inputs {
+            for definition in [stiffness, damping] {
+                forces.push(Instance {
+                    definition,
+                    channel: input,
+                    signal,
+                    direction: Direction::Matched(input),
+                });
+            }
+        }
+    }
+    let mut sets = vec![gains.clone()];
+    if gains.len() + forces.len() <= MOST_ADJUSTED {
+        if inputs.len() == 1 {
+            sets.extend(forces.iter().map(|f| vec![*f]));
+        }
+        sets.push(forces.clone());
+        sets.push(gains.into_iter().chain(forces).collect());
+    }
+    sets
 }
 
 /// One fitted explanation.
@@ -106,7 +163,7 @@ pub(crate) fn single_effects(
 ) -> Vec<Ranked> {
     let count = problem.count();
     let mut leads: Vec<(usize, Lead)> = Vec::new();
-    let bases = [boring.frozen(count).clone(), boring.full.clone()];
+    let bases = [boring.strict.clone(), boring.full.clone()];
     let screens: Vec<(usize, Vec<Vec<Lead>>)> = [0, 1]
         .into_par_iter()
         .map(|index| {
@@ -130,11 +187,14 @@ pub(crate) fn single_effects(
         }
         leads.extend(own.into_iter().map(|lead| (index, lead)));
     }
-    // Every lead twice: beside the plant as given, and with the plant free. A few steps tell which deserve more.
-    let frozen = boring.frozen(count);
+    // Every lead beside the plant as given, adjusted, and free. A few steps tell which deserve more.
+    let frozen = &boring.strict;
     let mut jobs: Vec<(Structure, Vec<f64>)> = Vec::new();
     for (index, lead) in &leads {
         jobs.push(extended(&frozen.structure, &frozen.theta, lead));
+        if boring.near.structure.adjusted > 0 {
+            jobs.push(extended(&boring.near.structure, &boring.near.theta, lead));
+        }
         jobs.push(if *index == 0 {
             let full = &boring.full.structure;
             let mut theta = full.given();

@@ -289,7 +289,10 @@ fn learn_nonlinear(mut data: Data, noise_free: &Data, structure: &Structure, sim
         initial_free: false,
         feedthrough_free: false,
         initial,
-        known: vec![fitted.effect_numbers(&best.theta, 0).to_vec()],
+        known: (0..fitted.effects.len())
+            .map(|i| fitted.effect_numbers(&best.theta, i).to_vec())
+            .collect(),
+        adjusted: 0,
         ..fitted.clone()
     };
     let missed: Series = noise_free.residual(&structure.simulate(&[], noise_free)?);
@@ -334,6 +337,7 @@ fn bare(plant: &Plant, initial: &[Vec<f64>]) -> Structure {
         feedthrough_free: false,
         effects: Vec::new(),
         known: Vec::new(),
+        adjusted: 0,
     }
 }
 

@@ -94,6 +94,8 @@ pub(crate) struct Structure {
     pub effects: Vec<Instance>,
     /// Numbers of the effects that the simulation knows; they are free when the plant is.
     pub known: Vec<Vec<f64>>,
+    /// So many effects after those are adjustments of a number (`effects::linear`), not new physics.
+    pub adjusted: usize,
 }
 
 impl Structure {
@@ -119,6 +121,16 @@ impl Structure {
         } else {
             0
         }
+    }
+
+    /// Index of the first effect that is new physics.
+    pub fn first_new(&self) -> usize {
+        self.known.len() + self.adjusted
+    }
+
+    /// The effects that are new physics.
+    pub fn new_effects(&self) -> &[Instance] {
+        &self.effects[self.first_new()..]
     }
 
     /// Effects whose numbers are in the parameter vector.

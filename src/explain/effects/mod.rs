@@ -9,6 +9,7 @@ mod change;
 mod disturbance;
 mod friction;
 mod law;
+mod linear;
 mod process;
 mod sensor;
 mod stiffness;
@@ -228,7 +229,9 @@ pub fn library() -> impl Iterator<Item = &'static Definition> {
     .flatten()
 }
 
-/// The first entry with this id and variant.
+/// The entry with this id and variant, also of what is not physics but a number (`linear`).
 pub fn find(id: &str, variant: &str) -> Option<&'static Definition> {
-    library().find(|d| d.id == id && d.variant == variant)
+    library()
+        .chain(linear::ENTRIES)
+        .find(|d| d.id == id && d.variant == variant)
 }

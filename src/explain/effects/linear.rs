@@ -1,0 +1,60 @@
+//! Not physics that was left out, but physics with another number: what a simulation may have slightly wrong.
+//!
+//! A wrong gain, stiffness or damping is one number each. Without them among the boring explanations, an effect that
+//! degenerates to one of them (a stop at the origin is a spring) would win by having fewer numbers than a whole new
+//! plant.
+
+use super::{Action, Clock, Definition, Motion, Needs, Parameter, Sense, Unit};
+
+pub(super) static ENTRIES: &[Definition] = &[
+    Definition {
+        id: "input_gain",
+        variant: "",
+        name: "gain of the input",
+        equation: "u_eff = (1 + g) u",
+        parameters: &[Parameter::between("gain_change", Unit::Ratio, -3.0, 10.0)],
+        mimics: &[],
+        linear: &[0],
+        persists: true,
+        action: Action::Input(gain),
+        starts: |_| Vec::new(),
+    },
+    Definition {
+        id: "linear_stiffness",
+        variant: "",
+        name: "stiffness",
+        equation: "F = -dk x",
+        parameters: &[],
+        mimics: &[],
+        linear: &[],
+        persists: true,
+        action: Action::Force(stiffness, Needs::Position, Sense::Either),
+        starts: |_| Vec::new(),
+    },
+    Definition {
+        id: "linear_damping",
+        variant: "",
+        name: "damping",
+        equation: "F = -dd v",
+        parameters: &[],
+        mimics: &[],
+        linear: &[],
+        persists: true,
+        action: Action::Force(damping, Needs::Rate, Sense::Either),
+        starts: |_| Vec::new(),
+    },
+];
+
+fn gain(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+    for u in u {
+        *u *= 1.0 + p[0];
+    }
+}
+
+fn stiffness(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    -motion.middle()
+}
+
+fn damping(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    -motion.middle_rate()
+}
