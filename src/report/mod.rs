@@ -16,6 +16,7 @@ mod location;
 mod matrix;
 mod model_document;
 mod packed;
+mod page;
 mod read;
 mod read_explanation;
 mod schema;
@@ -29,11 +30,8 @@ pub(crate) use model_document::names;
 pub use model_document::{
     DiagnosticsDocument, InvariantsDocument, MODEL_FORMAT, ModelDocument, Provenance,
 };
+pub use page::{PageError, explanation_page};
 pub use packed::CovarianceDocument;
 pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
 pub use read::{ReadModel, parse_model, read_model};
-/// TEMPORARY until the page is in.
-pub fn explanation_page(_: &crate::explain::Explanation) -> Result<String, DocumentError> {
-    Ok(String::new())
-}
 pub use schema::{explanation_schema, model_schema};
