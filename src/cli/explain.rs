@@ -20,6 +20,12 @@ const EXAMPLE: &str = "Examples:
 The simulation is a CSV of its outputs on the recorded inputs (one file a recording, in the same order), or one linear
 model as JSON ({\"A\":..,\"B\":..,\"C\":..,\"D\":..,\"dt\":..}, or what `innovant identify` writes).
 
+Effects (for --without):
+  coulomb_friction stribeck_friction quadratic_drag cubic_stiffness quadratic_stiffness end_stop hysteresis
+  position_dependent_gain input_saturation input_dead_zone input_backlash input_rate_limit input_asymmetry input_delay
+  actuator_lag sensor_saturation sensor_offset sensor_drift sensor_rectification sensor_quantization sensor_freeze
+  periodic_disturbance load_step extra_mode missing_input gain_change stiffness_change
+
 Exit codes: 0 the simulation agrees with the recording; 1 something is missing in it; 2 an error.
 With --output or --report the exit code is 0 whatever was found, unless --exit-code is given.";
 
@@ -62,7 +68,10 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     if let (Some(a), Some(b)) = (&flags.output, &flags.report)
         && a == b
     {
-        anyhow::bail!("{}: --output and --report name the same file; give two", a.display());
+        anyhow::bail!(
+            "{}: --output and --report name the same file; give two",
+            a.display()
+        );
     }
     let roles = flags.roles.roles();
     let mut logs: Vec<Log> = Vec::with_capacity(flags.logs.len());
@@ -70,7 +79,13 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         let log = Log::read(source, &roles)?;
         if let Some(first) = logs.first() {
             check_same_channels(&first.name, &first.inputs, &log.name, &log.inputs, "inputs")?;
-            check_same_channels(&first.name, &first.outputs, &log.name, &log.outputs, "outputs")?;
+            check_same_channels(
+                &first.name,
+                &first.outputs,
+                &log.name,
+                &log.outputs,
+                "outputs",
+            )?;
             check_same_sampling(&first.name, first.sample_time, &log.name, log.sample_time)?;
         }
         logs.push(log);
@@ -87,7 +102,10 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     if let Some(report) = &report {
         report.write(&explanation_page(&explanation)?)?;
     }
-    let to_stdout = [&output, &report].into_iter().flatten().any(Output::is_stdout);
+    let to_stdout = [&output, &report]
+        .into_iter()
+        .flatten()
+        .any(Output::is_stdout);
     if !say.quiet {
         let text = explanation_text(&explanation);
         if to_stdout {
@@ -97,7 +115,11 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         }
     }
     let asked = flags.exit_code || (flags.output.is_none() && flags.report.is_none());
-    Ok(if asked && missing(&explanation) { Outcome::Rejected } else { Outcome::Done })
+    Ok(if asked && missing(&explanation) {
+        Outcome::Rejected
+    } else {
+        Outcome::Done
+    })
 }
 
 /// Whether the simulation lacks something.
@@ -106,11 +128,17 @@ fn missing(explanation: &Explanation) -> bool {
 }
 
 fn simulation(files: &[PathBuf], logs: &[Log], roles: &Roles) -> anyhow::Result<Simulation> {
-    let is_json = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    let is_json = |path: &Path| {
+        path.extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("json"))
+    };
     if files.iter().any(|f| is_json(f)) {
         if let [file] = files {
             let model = read_model(file)?.model;
-            return Ok(Simulation::Model(Box::new(model), file.display().to_string()));
+            return Ok(Simulation::Model(
+                Box::new(model),
+                file.display().to_string(),
+            ));
         }
         anyhow::bail!(
             "--simulation takes one model (JSON) for all recordings, or one CSV a recording; {} files are given, and one \

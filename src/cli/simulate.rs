@@ -63,7 +63,9 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         return simulate_explanation(flags, &output, &explanation);
     }
     if flags.simulation.is_some() {
-        anyhow::bail!("{name}: --simulation belongs to an explanation, and this is a model; leave it out");
+        anyhow::bail!(
+            "{name}: --simulation belongs to an explanation, and this is a model; leave it out"
+        );
     }
     let model = read_model(&flags.model)?.model;
     if model.inputs.is_empty() {
@@ -119,12 +121,18 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
 /// The explanation in `path`, if that is one; `-` and unreadable files are left to the reader of models.
 fn explanation(path: &Path) -> anyhow::Result<Option<Explanation>> {
     match std::fs::read_to_string(path) {
-        Ok(text) if is_explanation(&text) => Ok(Some(parse_explanation(&path.display().to_string(), &text)?)),
+        Ok(text) if is_explanation(&text) => {
+            Ok(Some(parse_explanation(&path.display().to_string(), &text)?))
+        }
         _ => Ok(None),
     }
 }
 
-fn simulate_explanation(flags: Flags, output: &Output, explanation: &Explanation) -> anyhow::Result<Outcome> {
+fn simulate_explanation(
+    flags: Flags,
+    output: &Output,
+    explanation: &Explanation,
+) -> anyhow::Result<Outcome> {
     let model = &explanation.model;
     let name = flags.model.display().to_string();
     let channel = |c: &Channel| IdentifiedChannel {
@@ -164,7 +172,11 @@ fn simulate_explanation(flags: Flags, output: &Output, explanation: &Explanation
                 sample_time: roles.sample_time,
                 ..Roles::default()
             };
-            Some(Log::read_with(&Source::from(file.clone()), &named, RoleNeed::OutputsOnly)?)
+            Some(Log::read_with(
+                &Source::from(file.clone()),
+                &named,
+                RoleNeed::OutputsOnly,
+            )?)
         }
         None => None,
     };
@@ -185,7 +197,11 @@ fn simulate_explanation(flags: Flags, output: &Output, explanation: &Explanation
     let outputs = model
         .simulate(&columns, start.as_deref(), correction.as_deref())
         .map_err(|error| anyhow::anyhow!("{name}: {error}"))?;
-    let table: Vec<(&Channel, &[f64])> = model.outputs.iter().zip(outputs.iter().map(Vec::as_slice)).collect();
+    let table: Vec<(&Channel, &[f64])> = model
+        .outputs
+        .iter()
+        .zip(outputs.iter().map(Vec::as_slice))
+        .collect();
     write_table(output.path(), log.sample_time, log.start_time, &table)?;
     Ok(Outcome::Done)
 }

@@ -58,13 +58,23 @@ pub(crate) fn adequacy(problem: &Problem, fit: &Fit, before: Option<&Fit>) -> Op
             let there: f64 = whitened
                 .iter()
                 .zip(&problem.mask)
-                .flat_map(|(e, m)| e.iter().zip(m).filter(|(_, keep)| **keep).map(|(e, _)| e * e))
+                .flat_map(|(e, m)| {
+                    e.iter()
+                        .zip(m)
+                        .filter(|(_, keep)| **keep)
+                        .map(|(e, _)| e * e)
+                })
                 .sum();
             let now: f64 = noise
                 .whiten(&fit.residual)
                 .iter()
                 .zip(&problem.mask)
-                .flat_map(|(e, m)| e.iter().zip(m).filter(|(_, keep)| **keep).map(|(e, _)| e * e))
+                .flat_map(|(e, m)| {
+                    e.iter()
+                        .zip(m)
+                        .filter(|(_, keep)| **keep)
+                        .map(|(e, _)| e * e)
+                })
                 .sum();
             (gained - features as f64 * variance).max(0.0) / (there - now).max(1e-300)
         }),

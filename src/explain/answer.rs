@@ -8,8 +8,9 @@ use super::data::{Data, Series};
 use super::effects::{self, Action, Definition, Port};
 use super::error::ExplainError;
 use super::explanation::{
-    Alternative, AugmentedModel, Detectable, EFFECTS_TIE, EXPLANATION_FORMAT, EffectFound, EffectSize, Evidence,
-    Explanation, FitTable, Location, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
+    Alternative, AugmentedModel, Detectable, EFFECTS_TIE, EXPLANATION_FORMAT, EffectFound,
+    EffectSize, Evidence, Explanation, FitTable, Location, NoiseFound, ParameterChange, Quantity,
+    Remaining, SignalTraces, Verdict,
 };
 use super::fit::{Fit, Problem};
 use super::inquiry::{Finding, NEEDED, inquire};
@@ -40,7 +41,11 @@ const TRACE_POINTS: usize = 1500;
 ///
 /// # Errors
 /// [`ExplainError`]: recordings and simulation do not fit together, are too short, or the simulation is unstable.
-pub fn explain(recordings: &[Log], simulation: &Simulation, options: &Options) -> Result<Explanation, ExplainError> {
+pub fn explain(
+    recordings: &[Log],
+    simulation: &Simulation,
+    options: &Options,
+) -> Result<Explanation, ExplainError> {
     for id in &options.without {
         if effects::library().all(|d| d.id != id) {
             return Err(ExplainError::UnknownEffect { id: id.clone() });
@@ -48,9 +53,10 @@ pub fn explain(recordings: &[Log], simulation: &Simulation, options: &Options) -
     }
     let known = know(recordings, simulation)?;
     let allowed = |d: &Definition| !options.without.iter().any(|id| id == d.id);
-    let (finding, mask) = inquire(&known.data, &known.structure, &allowed).ok_or_else(|| ExplainError::NoFit {
-        name: recordings[0].name.clone(),
-    })?;
+    let (finding, mask) =
+        inquire(&known.data, &known.structure, &allowed).ok_or_else(|| ExplainError::NoFit {
+            name: recordings[0].name.clone(),
+        })?;
     Ok(Answer {
         recordings,
         known: &known,
@@ -110,7 +116,13 @@ impl Answer<'_> {
             first.evidence.heldout_gain = heldout_gain;
         }
         let verdict = finding.verdict;
-        let location = self.location(&squares, boring, model, shown, (&input_names, &output_names));
+        let location = self.location(
+            &squares,
+            boring,
+            model,
+            shown,
+            (&input_names, &output_names),
+        );
         let alternatives = self.alternatives();
         let separating_experiment = self.experiment();
         let mut augmented = AugmentedModel::describe(
@@ -139,7 +151,11 @@ impl Answer<'_> {
             verdict,
             probability: probability(finding),
             summary: Vec::new(),
-            effects: if verdict == Verdict::Unexplained { Vec::new() } else { effects },
+            effects: if verdict == Verdict::Unexplained {
+                Vec::new()
+            } else {
+                effects
+            },
             alternatives,
             location,
             fit,
@@ -172,10 +188,19 @@ impl Answer<'_> {
     fn output_that_shows(&self, boring: &Fit, model: &Fit) -> usize {
         let l = self.data().outputs;
         let drop = |o: usize| {
-            let size = |r: &Series| r.iter().skip(o).step_by(l).flatten().map(|v| v * v).sum::<f64>();
+            let size = |r: &Series| {
+                r.iter()
+                    .skip(o)
+                    .step_by(l)
+                    .flatten()
+                    .map(|v| v * v)
+                    .sum::<f64>()
+            };
             size(&boring.residual) / size(&model.residual).max(1e-300)
         };
-        (0..l).max_by(|a, b| drop(*a).total_cmp(&drop(*b))).unwrap_or(0)
+        (0..l)
+            .max_by(|a, b| drop(*a).total_cmp(&drop(*b)))
+            .unwrap_or(0)
     }
 
     fn signal_name(&self, effect: &super::structure::Instance) -> String {
@@ -241,7 +266,14 @@ impl Answer<'_> {
             let time = |k: usize| {
                 self.data().segments[freeze.segment].start_time + k as f64 * self.data().sample_time
             };
-            found.extend(self.exact("sensor_freeze", freeze.output, &[("from", time(freeze.from), "s"), ("to", time(freeze.to), "s")]));
+            found.extend(self.exact(
+                "sensor_freeze",
+                freeze.output,
+                &[
+                    ("from", time(freeze.from), "s"),
+                    ("to", time(freeze.to), "s"),
+                ],
+            ));
         }
         if let Some((output, step)) = self.finding.coarse {
             let unit = self.outputs()[output].unit.clone().unwrap_or_default();
@@ -291,7 +323,10 @@ impl Answer<'_> {
         let output = match effect.signal {
             Signal::Output(o) | Signal::Integral(o) | Signal::Difference(o, _) => o,
         };
-        (&self.inputs()[input.min(self.inputs().len() - 1)], &self.outputs()[output])
+        (
+            &self.inputs()[input.min(self.inputs().len() - 1)],
+            &self.outputs()[output],
+        )
     }
 
     /// The amplitude of a force: in the unit of an input, through which it acts or to which it is compared by what both
@@ -320,13 +355,17 @@ impl Answer<'_> {
         let (value, std, unit) = match effect.direction {
             Direction::Matched(input) => (
                 numbers[0],
-                covariance.filter(|_| !fixed).map(|c| c[(offset, offset)].max(0.0).sqrt()),
+                covariance
+                    .filter(|_| !fixed)
+                    .map(|c| c[(offset, offset)].max(0.0).sqrt()),
                 self.inputs()[input].unit.clone().unwrap_or_default(),
             ),
             Direction::Free => {
                 // Along the strongest input's effect on the rate.
                 let gain = |input: usize| dot(&rate, &plant.b_column(input));
-                let input = (0..self.data().signals()).max_by(|a, b| gain(*a).abs().total_cmp(&gain(*b).abs())).unwrap_or(0);
+                let input = (0..self.data().signals())
+                    .max_by(|a, b| gain(*a).abs().total_cmp(&gain(*b).abs()))
+                    .unwrap_or(0);
                 let scale = gain(input);
                 if scale.abs() < 1e-300 {
                     return;
@@ -338,12 +377,20 @@ impl Answer<'_> {
                     let r = nalgebra::DVector::from_column_slice(&rate);
                     ((r.transpose() * block * &r)[(0, 0)].max(0.0)).sqrt() / scale.abs()
                 });
-                (value * scale.signum(), std, self.inputs()[input].unit.clone().unwrap_or_default())
+                (
+                    value * scale.signum(),
+                    std,
+                    self.inputs()[input].unit.clone().unwrap_or_default(),
+                )
             }
         };
         let (_, output) = self.channels_of(effect);
         let of = output.unit.clone().unwrap_or_default();
-        let rate_unit = if matches!(effect.signal, Signal::Integral(_)) { of.clone() } else { format!("{of}/s") };
+        let rate_unit = if matches!(effect.signal, Signal::Integral(_)) {
+            of.clone()
+        } else {
+            format!("{of}/s")
+        };
         let unit = match (unit.is_empty() || of.is_empty(), per, effect.definition.id) {
             (_, 0, _) => unit,
             (true, ..) => String::new(),
@@ -364,12 +411,25 @@ impl Answer<'_> {
         parameters.insert(name.to_owned(), Quantity { value, std, unit });
     }
 
-    fn proof(&self, problem: &Problem, boring: &Fit, model: &Fit, shown: usize) -> (FitTable, EffectSize, Option<f64>) {
+    fn proof(
+        &self,
+        problem: &Problem,
+        boring: &Fit,
+        model: &Fit,
+        shown: usize,
+    ) -> (FitTable, EffectSize, Option<f64>) {
         let data = self.data();
         let given = &self.finding.boring.given;
         let parameters = &self.finding.boring.full;
-        let parameters = if self.finding.verdict == Verdict::Consistent { boring } else { parameters };
-        let structure_share = self.finding.adequacy.map_or(0.0, |a| if a.p_value < 0.01 { a.share } else { 0.0 });
+        let parameters = if self.finding.verdict == Verdict::Consistent {
+            boring
+        } else {
+            parameters
+        };
+        let structure_share = self
+            .finding
+            .adequacy
+            .map_or(0.0, |a| if a.p_value < 0.01 { a.share } else { 0.0 });
         let train_steps = prove::Steps {
             simulation: &given.residual,
             parameters_only: &parameters.residual,
@@ -398,22 +458,32 @@ impl Answer<'_> {
             _ => None,
         };
         let heldout_gain = match (&refit_parameters, &refit_model) {
-            (Some(p), Some(m)) => Some(p.noise.deviance(&p.residual, &test_mask) - m.noise.deviance(&m.residual, &test_mask)),
+            (Some(p), Some(m)) => Some(
+                p.noise.deviance(&p.residual, &test_mask)
+                    - m.noise.deviance(&m.residual, &test_mask),
+            ),
             _ => None,
         };
         let square = |f: f64| f * f;
         let lost = |f: &super::explanation::FitFigure| square((100.0 - f.fit_percent) / 100.0);
         let size = EffectSize {
             linear_share: (1.0 - lost(&train.parameters_only)).clamp(0.0, 1.0),
-            removed_share: (1.0 - square(train.augmented.rmse / train.parameters_only.rmse.max(1e-300))).clamp(0.0, 1.0),
-            heldout_gain: heldout.as_ref().map_or(0.0, |h| h.parameters_only.rmse - h.augmented.rmse),
+            removed_share: (1.0
+                - square(train.augmented.rmse / train.parameters_only.rmse.max(1e-300)))
+            .clamp(0.0, 1.0),
+            heldout_gain: heldout
+                .as_ref()
+                .map_or(0.0, |h| h.parameters_only.rmse - h.augmented.rmse),
         };
         let time = |s: usize, k: usize| data.segments[s].start_time + k as f64 * data.sample_time;
         let table = FitTable {
             output: self.outputs()[shown].name.clone(),
             train,
             heldout,
-            heldout_blocks: prove::blocks(data).into_iter().map(|(s, a, b)| [time(s, a), time(s, b)]).collect(),
+            heldout_blocks: prove::blocks(data)
+                .into_iter()
+                .map(|(s, a, b)| [time(s, a), time(s, b)])
+                .collect(),
         };
         (table, size, heldout_gain)
     }
@@ -428,7 +498,9 @@ impl Answer<'_> {
     ) -> Location {
         let data = self.data();
         let l = data.outputs;
-        let end = |s: usize| data.segments[s].start_time + data.segments[s].samples() as f64 * data.sample_time;
+        let end = |s: usize| {
+            data.segments[s].start_time + data.segments[s].samples() as f64 * data.sample_time
+        };
         let mean = |o: usize| {
             let (mut sum, mut n) = (0.0, 0.0);
             for s in (o..squares.len()).step_by(l) {
@@ -454,13 +526,19 @@ impl Answer<'_> {
         }
         let mut time: Vec<[f64; 3]> = Vec::new();
         for freeze in &self.finding.freezes {
-            let at = |k: usize| data.segments[freeze.segment].start_time + k as f64 * data.sample_time;
+            let at =
+                |k: usize| data.segments[freeze.segment].start_time + k as f64 * data.sample_time;
             time.push([at(freeze.from), at(freeze.to), 1.0]);
         }
         for index in model.structure.first_new()..model.structure.effects.len() {
             let effect = &model.structure.effects[index];
             let shape = model.structure.shape(&model.theta, index);
-            if let Some(at) = effect.definition.parameters.iter().position(|p| p.name == "from") {
+            if let Some(at) = effect
+                .definition
+                .parameters
+                .iter()
+                .position(|p| p.name == "from")
+            {
                 time.push([shape[at], end(0), mean(shown).0]);
             }
         }
@@ -492,7 +570,14 @@ impl Answer<'_> {
     }
 
     fn alternatives(&self) -> Vec<Alternative> {
-        let named: Vec<&str> = self.finding.model.structure.new_effects().iter().map(|e| e.definition.id).collect();
+        let named: Vec<&str> = self
+            .finding
+            .model
+            .structure
+            .new_effects()
+            .iter()
+            .map(|e| e.definition.id)
+            .collect();
         let gain = self.finding.gain;
         let unexplained = self.finding.verdict == Verdict::Unexplained;
         self.finding
@@ -502,13 +587,22 @@ impl Answer<'_> {
             .take(12)
             .map(|r| {
                 let why_not = if unexplained {
-                    format!("it leaves structure that noise does not make (evidence {})", words::number(r.gain))
+                    format!(
+                        "it leaves structure that noise does not make (evidence {})",
+                        words::number(r.gain)
+                    )
                 } else if gain <= 0.0 {
-                    format!("evidence {}, and {NEEDED:.0} is needed", words::number(r.gain))
+                    format!(
+                        "evidence {}, and {NEEDED:.0} is needed",
+                        words::number(r.gain)
+                    )
                 } else if gain - r.gain < EFFECTS_TIE {
                     "it explains this recording equally well".to_owned()
                 } else if r.gain < NEEDED {
-                    format!("it explains no more than other parameters do (evidence {})", words::number(r.gain))
+                    format!(
+                        "it explains no more than other parameters do (evidence {})",
+                        words::number(r.gain)
+                    )
                 } else {
                     format!(
                         "its evidence is {} against {}: exp({}) times less likely",
@@ -519,7 +613,11 @@ impl Answer<'_> {
                 };
                 Alternative {
                     effect: r.definition.id.to_owned(),
-                    support: if gain > 0.0 { (r.gain / gain).clamp(0.0, 1.0) } else { 0.0 },
+                    support: if gain > 0.0 {
+                        (r.gain / gain).clamp(0.0, 1.0)
+                    } else {
+                        0.0
+                    },
                     criterion_gain: r.gain,
                     why_not,
                 }
@@ -554,7 +652,10 @@ impl Answer<'_> {
     }
 
     fn remaining(&self, problem: &Problem, model: &Fit) -> Remaining {
-        let adequacy = self.finding.adequacy.or_else(|| adequacy(problem, model, None));
+        let adequacy = self
+            .finding
+            .adequacy
+            .or_else(|| adequacy(problem, model, None));
         let Some(a) = adequacy else {
             return Remaining {
                 adequate: true,
@@ -566,11 +667,19 @@ impl Answer<'_> {
         };
         let share = 100.0 * a.share;
         let sentence = if a.p_value > super::adequacy::LEVEL {
-            format!("What is left is noise to {} flexible features (p = {:.2})", a.features, a.p_value)
+            format!(
+                "What is left is noise to {} flexible features (p = {:.2})",
+                a.features, a.p_value
+            )
         } else if a.holds() {
-            format!("{share:.1} % of what is left is structure still: real, but small beside what was found")
+            format!(
+                "{share:.1} % of what is left is structure still: real, but small beside what was found"
+            )
         } else {
-            format!("{share:.0} % of what is left is structure (p = {:.0e})", a.p_value)
+            format!(
+                "{share:.0} % of what is left is structure (p = {:.0e})",
+                a.p_value
+            )
         };
         Remaining {
             adequate: a.holds(),
@@ -587,7 +696,11 @@ impl Answer<'_> {
                 output: self.outputs()[o].name.clone(),
                 autoregression: model.noise.ar[o].clone(),
                 innovation_std: model.noise.scale[o],
-                degrees_of_freedom: model.noise.degrees.is_finite().then_some(model.noise.degrees),
+                degrees_of_freedom: model
+                    .noise
+                    .degrees
+                    .is_finite()
+                    .then_some(model.noise.degrees),
             })
             .collect()
     }
@@ -612,12 +725,23 @@ impl Answer<'_> {
     }
 
     fn parameter_changes(&self, boring: &Fit) -> Vec<ParameterChange> {
-        let fit = if self.finding.model.structure.plant_free { &self.finding.model } else { boring };
+        let fit = if self.finding.model.structure.plant_free {
+            &self.finding.model
+        } else {
+            boring
+        };
         if !fit.structure.plant_free {
             return self.adjustments(fit);
         }
         let system = |plant: &super::plant::Plant| {
-            StateSpace::deterministic(plant.a_matrix(), plant.b_matrix(), plant.c_matrix(), plant.d_matrix(), plant.sample_time).ok()
+            StateSpace::deterministic(
+                plant.a_matrix(),
+                plant.b_matrix(),
+                plant.c_matrix(),
+                plant.d_matrix(),
+                plant.sample_time,
+            )
+            .ok()
         };
         let (Some(before), Some(after)) = (
             system(&fit.structure.coordinates.given),
@@ -658,7 +782,11 @@ impl Answer<'_> {
                 for j in 0..self.data().signals() {
                     if a[(o, j)].abs() > 1e-9 {
                         changes.push(ParameterChange {
-                            name: format!("static gain {}/{}", self.outputs()[o].name, self.inputs()[j].name),
+                            name: format!(
+                                "static gain {}/{}",
+                                self.outputs()[o].name,
+                                self.inputs()[j].name
+                            ),
                             simulation: a[(o, j)],
                             recording: b[(o, j)],
                             unit: String::new(),
@@ -691,7 +819,11 @@ impl Answer<'_> {
                         unit: String::new(),
                     },
                     id => ParameterChange {
-                        name: format!("additional {} at {}", id.trim_start_matches("linear_"), output.name),
+                        name: format!(
+                            "additional {} at {}",
+                            id.trim_start_matches("linear_"),
+                            output.name
+                        ),
                         simulation: 0.0,
                         recording: number,
                         unit: unit(if id == "linear_damping" { "/s" } else { "" }),
@@ -714,9 +846,23 @@ impl Answer<'_> {
                 let before = locate::spectrum(&boring.residual, l, o, data.sample_time);
                 let after = locate::spectrum(&model.residual, l, o, data.sample_time);
                 // In the units of the recording, also where the engine works relative to a simulator.
-                let recorded = &self.recordings[s].output_data[o];
-                let correction: Vec<f64> = recorded.iter().zip(&segment.outputs[o]).map(|(r, y)| r - y).collect();
-                let back = |v: &[f64]| -> Vec<f64> { thin(&v.iter().zip(&correction).map(|(v, c)| v + c).collect::<Vec<_>>()) };
+                let skip = ((segment.start_time - self.recordings[s].start_time) / data.sample_time)
+                    .round()
+                    .max(0.0) as usize;
+                let recorded = &self.recordings[s].output_data[o][skip..skip + segment.samples()];
+                let correction: Vec<f64> = recorded
+                    .iter()
+                    .zip(&segment.outputs[o])
+                    .map(|(r, y)| r - y)
+                    .collect();
+                let back = |v: &[f64]| -> Vec<f64> {
+                    thin(
+                        &v.iter()
+                            .zip(&correction)
+                            .map(|(v, c)| v + c)
+                            .collect::<Vec<_>>(),
+                    )
+                };
                 traces.push(SignalTraces {
                     output: self.outputs()[o].name.clone(),
                     unit: self.outputs()[o].unit.clone().unwrap_or_default(),

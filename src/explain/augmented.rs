@@ -34,10 +34,14 @@ pub enum AugmentedError {
     #[error("the model needs {needed} inputs of equal length, and {found} are given")]
     Inputs { needed: usize, found: usize },
     /// The outputs run away.
-    #[error("the simulation diverges on this input: it leaves the range that the model was fitted in; give an input of the amplitude of the recording")]
+    #[error(
+        "the simulation diverges on this input: it leaves the range that the model was fitted in; give an input of the amplitude of the recording"
+    )]
     Diverges,
     /// A correction is needed and was not given.
-    #[error("this explanation is relative to a simulator that is not linear: give its answer to the same input with --simulation FILE.csv (one column an output)")]
+    #[error(
+        "this explanation is relative to a simulator that is not linear: give its answer to the same input with --simulation FILE.csv (one column an output)"
+    )]
     SimulationNeeded,
 }
 
@@ -60,7 +64,8 @@ impl AugmentedModel {
             .map(|(index, effect)| {
                 let force = matches!(effect.definition.action, Action::Force(..));
                 let numbers = structure.effect_numbers(theta, index);
-                let before = effect.amplitudes(structure.states()) + effect.definition.parameters.len();
+                let before =
+                    effect.amplitudes(structure.states()) + effect.definition.parameters.len();
                 ModelEffect {
                     effect: effect.definition.id.to_owned(),
                     variant: effect.definition.variant.to_owned(),
@@ -139,7 +144,11 @@ impl AugmentedModel {
     ///
     /// # Errors
     /// As [`AugmentedModel::simulate`].
-    pub fn estimate_initial_state(&self, inputs: &[&[f64]], outputs: &[&[f64]]) -> Result<Vec<f64>, AugmentedError> {
+    pub fn estimate_initial_state(
+        &self,
+        inputs: &[&[f64]],
+        outputs: &[&[f64]],
+    ) -> Result<Vec<f64>, AugmentedError> {
         let samples = inputs.first().map_or(0, |u| u.len()).min(INITIAL_SAMPLES);
         let inputs: Vec<&[f64]> = inputs.iter().map(|u| &u[..samples]).collect();
         let n = self.a.0.nrows();
@@ -148,7 +157,9 @@ impl AugmentedModel {
             .map(|o| {
                 let y = &outputs[o][..samples];
                 let mean = y.iter().sum::<f64>() / samples.max(1) as f64;
-                (y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / samples.max(1) as f64).sqrt().max(1e-12)
+                (y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / samples.max(1) as f64)
+                    .sqrt()
+                    .max(1e-12)
             })
             .collect();
         let error = |x: &[f64]| -> Result<Vec<f64>, AugmentedError> {
@@ -162,7 +173,8 @@ impl AugmentedModel {
         let mut x = vec![0.0; n];
         let mut e = error(&x)?;
         let cost = |e: &[f64], x: &[f64]| -> f64 {
-            e.iter().map(|v| v * v).sum::<f64>() + PRIOR * x.iter().map(|v| (v / spread).powi(2)).sum::<f64>()
+            e.iter().map(|v| v * v).sum::<f64>()
+                + PRIOR * x.iter().map(|v| (v / spread).powi(2)).sum::<f64>()
         };
         let mut damping = 1e-3;
         for _ in 0..40 {
@@ -205,7 +217,11 @@ impl AugmentedModel {
         Ok(x)
     }
 
-    fn run(&self, inputs: &[&[f64]], initial: Option<&[f64]>) -> Result<Vec<Vec<f64>>, AugmentedError> {
+    fn run(
+        &self,
+        inputs: &[&[f64]],
+        initial: Option<&[f64]>,
+    ) -> Result<Vec<Vec<f64>>, AugmentedError> {
         let structure = self.structure()?;
         let signals = structure.coordinates.given.inputs - usize::from(self.constant_input);
         let samples = inputs.first().map_or(0, |u| u.len());
@@ -236,15 +252,25 @@ impl AugmentedModel {
 
     /// The structure with all numbers fixed.
     pub(crate) fn structure(&self) -> Result<Structure, AugmentedError> {
-        let damaged = |what: &str| AugmentedError::Damaged { what: what.to_owned() };
+        let damaged = |what: &str| AugmentedError::Damaged {
+            what: what.to_owned(),
+        };
         let (n, l) = (self.a.0.nrows(), self.c.0.nrows());
         let r = self.inputs.len() + usize::from(self.constant_input);
-        let shaped = |m: &Rows, rows: usize, columns: usize, name: &str| -> Result<DMatrix<f64>, AugmentedError> {
+        let shaped = |m: &Rows,
+                      rows: usize,
+                      columns: usize,
+                      name: &str|
+         -> Result<DMatrix<f64>, AugmentedError> {
             let m = m.clone().shaped(rows, columns);
             if m.shape() == (rows, columns) && m.iter().all(|v| v.is_finite()) {
                 Ok(m)
             } else {
-                Err(damaged(&format!("{name} is {} x {}, not {rows} x {columns}", m.nrows(), m.ncols())))
+                Err(damaged(&format!(
+                    "{name} is {} x {}, not {rows} x {columns}",
+                    m.nrows(),
+                    m.ncols()
+                )))
             }
         };
         if n > super::run::MOST_STATES || l == 0 || r == 0 {
@@ -266,9 +292,11 @@ impl AugmentedModel {
         let mut instances = Vec::new();
         let mut known = Vec::new();
         for effect in &self.effects {
-            let definition = effects::find(&effect.effect, &effect.variant).ok_or_else(|| AugmentedError::Unknown {
-                id: effect.effect.clone(),
-                variant: effect.variant.clone(),
+            let definition = effects::find(&effect.effect, &effect.variant).ok_or_else(|| {
+                AugmentedError::Unknown {
+                    id: effect.effect.clone(),
+                    variant: effect.variant.clone(),
+                }
             })?;
             let (signal, places) = match effect.looks_at {
                 SignalReference::Output(o) => (Signal::Output(o), vec![o]),
@@ -284,7 +312,9 @@ impl AugmentedModel {
             let on_output = matches!(definition.action, Action::Sensor(_));
             let channels = if on_output { l } else { r };
             if places.iter().any(|o| *o >= l) || effect.channel >= channels {
-                return Err(damaged("an effect belongs to a channel that does not exist"));
+                return Err(damaged(
+                    "an effect belongs to a channel that does not exist",
+                ));
             }
             let mut numbers = effect.direction.clone();
             for (p, v) in definition.parameters.iter().zip(&effect.parameters) {
@@ -295,7 +325,10 @@ impl AugmentedModel {
             }
             numbers.extend(&effect.coefficients);
             if numbers.len() != instance.len(n, l) || numbers.iter().any(|v| !v.is_finite()) {
-                return Err(damaged(&format!("{} has the wrong number of numbers", definition.id)));
+                return Err(damaged(&format!(
+                    "{} has the wrong number of numbers",
+                    definition.id
+                )));
             }
             instances.push(instance);
             known.push(numbers);

@@ -149,7 +149,8 @@ fn realise(
         let mut m = DMatrix::zeros(half * l, half * r);
         for i in 0..half {
             for j in 0..half {
-                m.view_mut((i * l, j * r), (l, r)).copy_from(&h[1 + i + j + shift]);
+                m.view_mut((i * l, j * r), (l, r))
+                    .copy_from(&h[1 + i + j + shift]);
             }
         }
         m

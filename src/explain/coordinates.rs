@@ -125,7 +125,11 @@ fn increment_scale(plant: &Plant) -> f64 {
         .determinant()
         .abs()
         .powf(1.0 / n as f64);
-    if norm.is_finite() && norm > 1e-3 { norm.min(2.0) } else { 0.1 }
+    if norm.is_finite() && norm > 1e-3 {
+        norm.min(2.0)
+    } else {
+        0.1
+    }
 }
 
 fn is_new(rows: &[DMatrix<f64>], row: &DMatrix<f64>) -> bool {
@@ -210,12 +214,16 @@ impl Derivatives {
         let integral = a_c
             .clone()
             .try_inverse()
-            .filter(|inverse| inverse.iter().all(|v| v.is_finite()) && inverse.norm() * a_c.norm() < 1e9)
+            .filter(|inverse| {
+                inverse.iter().all(|v| v.is_finite()) && inverse.norm() * a_c.norm() < 1e9
+            })
             .map(|inverse| rows(&c * inverse));
         let half = crate::linalg::exponential(&(&a_c * (0.5 * h)));
         let moment = half * (&a_c * &b_c) * (-h * h);
         Self {
-            moment: (0..r).map(|j| moment.column(j).iter().copied().collect()).collect(),
+            moment: (0..r)
+                .map(|j| moment.column(j).iter().copied().collect())
+                .collect(),
             rate: rows(&c * &a_c),
             rate_feedthrough: rows(&c * &b_c),
             integral,

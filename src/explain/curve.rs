@@ -12,7 +12,12 @@ use super::structure::Signal;
 const KNOTS: usize = 11;
 
 /// The variable whose static law explains most of what `fit` leaves, and that law.
-pub(crate) fn learn(problem: &Problem, fit: &Fit, inputs: &[String], outputs: &[String]) -> Option<Curve> {
+pub(crate) fn learn(
+    problem: &Problem,
+    fit: &Fit,
+    inputs: &[String],
+    outputs: &[String],
+) -> Option<Curve> {
     let mut fit = fit.clone();
     let noise = fit.noise.clone();
     let sensitivities = fit.sensitivities(problem);
@@ -22,7 +27,12 @@ pub(crate) fn learn(problem: &Problem, fit: &Fit, inputs: &[String], outputs: &[
     let active = fit.structure.coordinates.active_inputs.clone();
     let &drive = active.iter().find(|j| **j < data.signals())?;
     let mut variables: Vec<(String, Vec<Vec<f64>>)> = (0..data.signals())
-        .map(|j| (inputs[j].clone(), data.segments.iter().map(|s| s.inputs[j].clone()).collect()))
+        .map(|j| {
+            (
+                inputs[j].clone(),
+                data.segments.iter().map(|s| s.inputs[j].clone()).collect(),
+            )
+        })
         .collect();
     for signals in bench.signals() {
         let Signal::Output(o) = signals.instance_signal else {
@@ -33,14 +43,18 @@ pub(crate) fn learn(problem: &Problem, fit: &Fit, inputs: &[String], outputs: &[
     }
     for (variable, values) in variables {
         let all: Vec<f64> = values.concat();
-        let (low, high) = (effects::level(&all, 0.005, |v| v), effects::level(&all, 0.995, |v| v));
-        if !(high > low) {
+        let (low, high) = (
+            effects::level(&all, 0.005, |v| v),
+            effects::level(&all, 0.995, |v| v),
+        );
+        if high <= low || high.is_nan() || low.is_nan() {
             continue;
         }
         let knots: Vec<f64> = (0..KNOTS)
             .map(|i| low + (high - low) * i as f64 / (KNOTS - 1) as f64)
             .collect();
-        let Some((gain, coefficients, covariance)) = bench.static_law(drive, &values, &knots) else {
+        let Some((gain, coefficients, covariance)) = bench.static_law(drive, &values, &knots)
+        else {
             continue;
         };
         if best.as_ref().is_some_and(|(g, _)| *g >= gain) {
@@ -69,10 +83,10 @@ pub(crate) fn learn(problem: &Problem, fit: &Fit, inputs: &[String], outputs: &[
 fn detrended(at: &[f64], value: &DVector<f64>, covariance: &DMatrix<f64>) -> (Vec<f64>, Vec<f64>) {
     let n = at.len();
     let line = DMatrix::from_fn(n, 2, |i, j| if j == 0 { 1.0 } else { at[i] });
-    let projector = line
-        .clone()
-        .pseudo_inverse(1e-12)
-        .map_or_else(|_| DMatrix::identity(n, n), |inverse| DMatrix::identity(n, n) - &line * inverse);
+    let projector = line.clone().pseudo_inverse(1e-12).map_or_else(
+        |_| DMatrix::identity(n, n),
+        |inverse| DMatrix::identity(n, n) - &line * inverse,
+    );
     let flat = &projector * value;
     let spread = &projector * covariance * projector.transpose();
     (
@@ -84,7 +98,8 @@ fn detrended(at: &[f64], value: &DVector<f64>, covariance: &DMatrix<f64>) -> (Ve
 /// Correlation with textbook shapes, each less its straight line, best first.
 fn shapes(at: &[f64], value: &[f64]) -> Vec<(String, f64)> {
     let half = at.iter().fold(0.0_f64, |m, v| m.max(v.abs())).max(1e-300);
-    let list: [(&str, fn(f64) -> f64); 8] = [
+    type Shape = (&'static str, fn(f64) -> f64);
+    let list: [Shape; 8] = [
         ("dry friction (sign)", |x| if x > 0.0 { 1.0 } else { -1.0 }),
         ("square with sign", |x| x * x.abs()),
         ("square", |x| x * x),
@@ -104,7 +119,10 @@ fn shapes(at: &[f64], value: &[f64]) -> Vec<(String, f64)> {
             let (shape, _) = detrended(at, &shape, &identity);
             let product: f64 = own.iter().zip(&shape).map(|(a, b)| a * b).sum();
             let size = norm(&own) * norm(&shape);
-            ((*name).to_owned(), if size > 0.0 { product / size } else { 0.0 })
+            (
+                (*name).to_owned(),
+                if size > 0.0 { product / size } else { 0.0 },
+            )
         })
         .collect();
     found.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));

@@ -9,10 +9,17 @@ pub enum ExplainError {
     #[error("explain needs at least one recording")]
     NoRecording,
     /// Not as many simulated recordings as recordings.
-    #[error("{recordings} recordings and {simulations} simulations: give one simulation column file for each recording, in the same order, or one model")]
-    Count { recordings: usize, simulations: usize },
+    #[error(
+        "{recordings} recordings and {simulations} simulations: give one simulation column file for each recording, in the same order, or one model"
+    )]
+    Count {
+        recordings: usize,
+        simulations: usize,
+    },
     /// Lengths differ.
-    #[error("{simulation}: {simulated} samples, and {recording} has {recorded}; simulate exactly the recorded input")]
+    #[error(
+        "{simulation}: {simulated} samples, and {recording} has {recorded}; simulate exactly the recorded input"
+    )]
     Length {
         recording: String,
         recorded: usize,
@@ -20,7 +27,9 @@ pub enum ExplainError {
         simulated: usize,
     },
     /// Sampling differs.
-    #[error("{simulation}: sample time {simulated} s, and {recording} is sampled at {recorded} s; simulate at the recording's sample time")]
+    #[error(
+        "{simulation}: sample time {simulated} s, and {recording} is sampled at {recorded} s; simulate at the recording's sample time"
+    )]
     Sampling {
         recording: String,
         recorded: f64,
@@ -31,7 +40,9 @@ pub enum ExplainError {
     #[error("{simulation}: {what}; name the columns with --outputs, or rename them in the file")]
     Channels { simulation: String, what: String },
     /// Units differ.
-    #[error("{simulation}: {channel} is in {simulated}, and the recording's is in {recorded}; convert one of them, or take the unit out of its header")]
+    #[error(
+        "{simulation}: {channel} is in {simulated}, and the recording's is in {recorded}; convert one of them, or take the unit out of its header"
+    )]
     Unit {
         simulation: String,
         channel: String,
@@ -39,7 +50,9 @@ pub enum ExplainError {
         simulated: String,
     },
     /// Too few samples.
-    #[error("{recording}: {samples} samples are too few: {needed} are needed to fit {states} states and still hold out blocks for the proof; record longer")]
+    #[error(
+        "{recording}: {samples} samples are too few: {needed} are needed to fit {states} states and still hold out blocks for the proof; record longer"
+    )]
     TooShort {
         recording: String,
         samples: usize,
@@ -47,21 +60,35 @@ pub enum ExplainError {
         states: usize,
     },
     /// The simulated output runs away.
-    #[error("{name}: the simulation is unstable (spectral radius {radius:.6}): its output leaves every bound on the recorded input; give a stable model, or the simulated output of the plant inside its loop")]
+    #[error(
+        "{name}: the simulation is unstable (spectral radius {radius:.6}): its output leaves every bound on the recorded input; give a stable model, or the simulated output of the plant inside its loop"
+    )]
     Unstable { name: String, radius: f64 },
     /// The simulated output could not be understood.
-    #[error("{name}: no dynamic model reproduces this simulated output from the recorded inputs (best relative misfit {misfit:.2}); check that it was simulated with these inputs, or give the model itself as JSON")]
+    #[error(
+        "{name}: no dynamic model reproduces this simulated output from the recorded inputs (best relative misfit {misfit:.2}); check that it was simulated with these inputs, or give the model itself as JSON"
+    )]
     NotUnderstood { name: String, misfit: f64 },
     /// More states than the engine runs.
-    #[error("{name}: {states} states, and at most {most} can be explained; reduce the model's order first")]
-    TooLarge { name: String, states: usize, most: usize },
+    #[error(
+        "{name}: {states} states, and at most {most} can be explained; reduce the model's order first"
+    )]
+    TooLarge {
+        name: String,
+        states: usize,
+        most: usize,
+    },
     /// An output that does not move.
-    #[error("{recording}: the output {output} is constant; there is nothing to explain")]
+    #[error(
+        "{recording}: the output {output} is constant; leave it out with --outputs, or check the sensor"
+    )]
     Constant { recording: String, output: String },
     /// An effect to leave out that does not exist.
     #[error("there is no effect called {id}; `innovant explain --help` lists them")]
     UnknownEffect { id: String },
     /// Every start failed.
-    #[error("{name}: no fit of the simulation to the recording succeeded; check that inputs and outputs are the ones that were simulated")]
+    #[error(
+        "{name}: no fit of the simulation to the recording succeeded; check that inputs and outputs are the ones that were simulated"
+    )]
     NoFit { name: String },
 }

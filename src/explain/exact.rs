@@ -63,7 +63,9 @@ pub(crate) fn frozen(data: &Data, simulated: &super::data::Series) -> Vec<Freeze
 fn range(values: &[f64]) -> (f64, f64) {
     values
         .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(*v), hi.max(*v)))
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| {
+            (lo.min(*v), hi.max(*v))
+        })
 }
 
 /// Spacing of the lattice that all values of `y` lie on, if they do and if they meet few of its points.
@@ -77,7 +79,10 @@ pub(crate) fn spacing(y: &[f64]) -> Option<f64> {
     if levels.len() < 3 || levels.len() * 4 > y.len() {
         return None;
     }
-    let step = levels.windows(2).map(|p| p[1] - p[0]).fold(f64::INFINITY, f64::min);
+    let step = levels
+        .windows(2)
+        .map(|p| p[1] - p[0])
+        .fold(f64::INFINITY, f64::min);
     // Better by least squares over the whole range.
     let refined = {
         let counts: Vec<f64> = levels.iter().map(|v| ((v - low) / step).round()).collect();
@@ -103,7 +108,9 @@ mod tests {
 
     #[test]
     fn a_lattice_is_found_and_noise_is_none() {
-        let coarse: Vec<f64> = (0..4000).map(|k| 0.3 * (3.0 * (0.01 * f64::from(k)).sin() / 0.3).round()).collect();
+        let coarse: Vec<f64> = (0..4000)
+            .map(|k| 0.3 * (3.0 * (0.01 * f64::from(k)).sin() / 0.3).round())
+            .collect();
         let step = spacing(&coarse).expect("a lattice");
         assert!((step - 0.3).abs() < 1e-9, "{step}");
         let smooth: Vec<f64> = (0..4000).map(|k| (0.01 * f64::from(k)).sin()).collect();

@@ -32,11 +32,23 @@ pub(crate) struct Effort {
 
 impl Effort {
     /// To see what deserves more.
-    pub const SCOUT: Self = Self { rounds: 1, steps: 6, settled: 0.5 };
+    pub const SCOUT: Self = Self {
+        rounds: 1,
+        steps: 6,
+        settled: 0.5,
+    };
     /// To rank candidates.
-    pub const RANK: Self = Self { rounds: 2, steps: 14, settled: 0.1 };
+    pub const RANK: Self = Self {
+        rounds: 2,
+        steps: 14,
+        settled: 0.1,
+    };
     /// To report.
-    pub const FINAL: Self = Self { rounds: 3, steps: 40, settled: 0.02 };
+    pub const FINAL: Self = Self {
+        rounds: 3,
+        steps: 40,
+        settled: 0.02,
+    };
 }
 
 /// What fits share: the data, which samples count, how the outputs are scaled.
@@ -261,8 +273,9 @@ impl Fit {
                     self.steps[i] = (self.steps[i] * 1e3).min(LARGEST_STEP);
                     continue;
                 }
-                let far = size > 30.0 * STEP_SHARE || size < STEP_SHARE / 30.0;
-                self.steps[i] = (self.steps[i] * (STEP_SHARE / size).clamp(1e-4, 1e4)).clamp(SMALLEST_STEP, LARGEST_STEP);
+                let far = !(STEP_SHARE / 30.0..=30.0 * STEP_SHARE).contains(&size);
+                self.steps[i] = (self.steps[i] * (STEP_SHARE / size).clamp(1e-4, 1e4))
+                    .clamp(SMALLEST_STEP, LARGEST_STEP);
                 if far {
                     continue;
                 }
@@ -284,14 +297,21 @@ impl Fit {
     fn jacobian(&mut self, problem: &Problem, noise: &Noise) -> Option<Jacobian> {
         let columns = self.sensitivities(problem);
         let rows: usize = problem.count();
-        let used: Vec<usize> = (0..columns.len()).filter(|i| columns[*i].is_some()).collect();
+        let used: Vec<usize> = (0..columns.len())
+            .filter(|i| columns[*i].is_some())
+            .collect();
         if used.is_empty() {
             return None;
         }
         let mut flat = Vec::with_capacity(rows * used.len());
         for column in columns.iter().flatten() {
             for (series, mask) in noise.whiten(column).iter().zip(&problem.mask) {
-                flat.extend(series.iter().zip(mask).filter_map(|(v, keep)| keep.then_some(*v)));
+                flat.extend(
+                    series
+                        .iter()
+                        .zip(mask)
+                        .filter_map(|(v, keep)| keep.then_some(*v)),
+                );
             }
         }
         flat.iter().all(|v| v.is_finite()).then(|| Jacobian {
@@ -307,7 +327,9 @@ impl Fit {
         let jacobian = self.jacobian(problem, &noise)?;
         let system = jacobian.normal_equations(problem, &noise, &self.residual);
         let m = system.used.len();
-        let scale: Vec<f64> = (0..m).map(|i| system.hessian[(i, i)].sqrt().max(1e-300)).collect();
+        let scale: Vec<f64> = (0..m)
+            .map(|i| system.hessian[(i, i)].sqrt().max(1e-300))
+            .collect();
         let mut scaled = system.hessian.clone();
         for i in 0..m {
             for j in 0..m {
@@ -336,7 +358,12 @@ struct Jacobian {
 
 impl Jacobian {
     /// The weighted least-squares system at `residual`.
-    fn normal_equations(&self, problem: &Problem, noise: &Noise, residual: &Series) -> NormalEquations {
+    fn normal_equations(
+        &self,
+        problem: &Problem,
+        noise: &Noise,
+        residual: &Series,
+    ) -> NormalEquations {
         let rows = self.columns.nrows();
         let mut weights = Vec::with_capacity(rows);
         let mut e = Vec::with_capacity(rows);
@@ -380,7 +407,9 @@ impl NormalEquations {
     /// The damped step, in units of each number's own curvature.
     fn step(&self, damping: f64) -> Option<DVector<f64>> {
         let m = self.used.len();
-        let scale: Vec<f64> = (0..m).map(|i| self.hessian[(i, i)].sqrt().max(1e-300)).collect();
+        let scale: Vec<f64> = (0..m)
+            .map(|i| self.hessian[(i, i)].sqrt().max(1e-300))
+            .collect();
         let mut h = self.hessian.clone();
         for i in 0..m {
             for j in 0..m {

@@ -119,7 +119,12 @@ fn trimmed(sums: &[f64], counts: &[f64], from: usize, to: usize) -> (usize, usiz
 }
 
 /// Power of a residual over frequency, all series of one output together, Hann window: `(Hz, power)`.
-pub(crate) fn spectrum(residual: &Series, outputs: usize, output: usize, sample_time: f64) -> Vec<(f64, f64)> {
+pub(crate) fn spectrum(
+    residual: &Series,
+    outputs: usize,
+    output: usize,
+    sample_time: f64,
+) -> Vec<(f64, f64)> {
     let mut total: Vec<(f64, f64)> = Vec::new();
     for column in residual.iter().skip(output).step_by(outputs) {
         let n = column.len();
@@ -131,7 +136,11 @@ pub(crate) fn spectrum(residual: &Series, outputs: usize, output: usize, sample_
         let mut windowed: Vec<f64> = column
             .iter()
             .enumerate()
-            .map(|(k, v)| v * (std::f64::consts::PI * (k as f64 + 0.5) / n as f64).sin().powi(2))
+            .map(|(k, v)| {
+                v * (std::f64::consts::PI * (k as f64 + 0.5) / n as f64)
+                    .sin()
+                    .powi(2)
+            })
             .collect();
         let mut out = transform.make_output_vec();
         if transform.process(&mut windowed, &mut out).is_err() {
@@ -159,7 +168,9 @@ fn bands(bins: usize) -> Vec<(usize, usize)> {
     let mut from = 2;
     let ratio = (bins as f64 / 4.0).powf(1.0 / BANDS as f64).max(1.05);
     while from < bins {
-        let to = ((from as f64 * ratio).ceil() as usize).max(from + 6).min(bins);
+        let to = ((from as f64 * ratio).ceil() as usize)
+            .max(from + 6)
+            .min(bins);
         edges.push((from, to));
         from = to;
     }
@@ -190,11 +201,19 @@ pub(crate) fn spectrum_picture(before: &[(f64, f64)], after: &[(f64, f64)]) -> V
     let mut picture = Vec::new();
     let mut from = 1;
     while from < bins {
-        let to = ((from as f64 * 1.04).ceil() as usize).max(from + 2).min(bins);
+        let to = ((from as f64 * 1.04).ceil() as usize)
+            .max(from + 2)
+            .min(bins);
         let mean = |s: &[(f64, f64)]| {
-            10.0 * (s[from..to].iter().map(|p| p.1).sum::<f64>() / (to - from) as f64).max(1e-300).log10()
+            10.0 * (s[from..to].iter().map(|p| p.1).sum::<f64>() / (to - from) as f64)
+                .max(1e-300)
+                .log10()
         };
-        picture.push([0.5 * (before[from].0 + before[to - 1].0), mean(before), mean(after)]);
+        picture.push([
+            0.5 * (before[from].0 + before[to - 1].0),
+            mean(before),
+            mean(after),
+        ]);
         from = to;
     }
     picture
@@ -212,10 +231,15 @@ pub(crate) fn regimes(
     let l = data.outputs;
     let h = data.sample_time;
     let mut variables: Vec<(String, Vec<f64>)> = Vec::new();
-    let over_segments = |f: &dyn Fn(usize) -> Vec<f64>| -> Vec<f64> { (0..data.segments.len()).flat_map(f).collect() };
+    let over_segments = |f: &dyn Fn(usize) -> Vec<f64>| -> Vec<f64> {
+        (0..data.segments.len()).flat_map(f).collect()
+    };
     for input in 0..data.signals() {
         let u = over_segments(&|s| data.segments[s].inputs[input].clone());
-        variables.push((format!("|{}|", names.0[input]), u.iter().map(|v| v.abs()).collect()));
+        variables.push((
+            format!("|{}|", names.0[input]),
+            u.iter().map(|v| v.abs()).collect(),
+        ));
         variables.push((names.0[input].clone(), u));
     }
     let y = over_segments(&|s| fit.simulated[s * l + output].clone());
@@ -225,12 +249,20 @@ pub(crate) fn regimes(
             .map(|k| (y[(k + 1).min(y.len() - 1)] - y[k.saturating_sub(1)]) / (2.0 * h))
             .collect()
     });
-    variables.push((format!("|{}|", names.1[output]), y.iter().map(|v| v.abs()).collect()));
+    variables.push((
+        format!("|{}|", names.1[output]),
+        y.iter().map(|v| v.abs()).collect(),
+    ));
     variables.push((names.1[output].clone(), y));
-    variables.push((format!("|d/dt {}|", names.1[output]), rate.iter().map(|v| v.abs()).collect()));
+    variables.push((
+        format!("|d/dt {}|", names.1[output]),
+        rate.iter().map(|v| v.abs()).collect(),
+    ));
     variables.push((format!("d/dt {}", names.1[output]), rate));
     let square = over_segments(&|s| squares[s * l + output].clone());
-    let counts: Vec<bool> = (0..data.segments.len()).flat_map(|s| mask[s * l + output].clone()).collect();
+    let counts: Vec<bool> = (0..data.segments.len())
+        .flat_map(|s| mask[s * l + output].clone())
+        .collect();
     let mut found = Vec::new();
     let tests = (variables.len() * 8) as f64;
     for (name, values) in variables {

@@ -11,7 +11,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `simulation`, `baseline` | the simulation as a model, also from a column of its outputs |
+//! | `simulation`, `baseline`, `rebaseline` | the simulation as a model, also from a column of its outputs |
 //! | `coordinates`, `plant`, `structure`, `run` | the augmented model: numbers, effects, the recursion |
 //! | `effects` | the library, one file a family |
 //! | `noise`, `fit` | coloured, heavy-tailed noise; Levenberg and Marquardt |
@@ -38,6 +38,7 @@ mod noise;
 mod plant;
 mod probability;
 mod prove;
+mod rebaseline;
 mod run;
 mod screen;
 mod search;
@@ -49,8 +50,8 @@ pub use answer::{Options, explain};
 pub use augmented::AugmentedError;
 pub use error::ExplainError;
 pub use explanation::{
-    Alternative, AugmentedModel, Curve, Detectable, EXPLANATION_FORMAT, EffectFound, EffectSize, Evidence, Explanation,
-    FitFigure, FitSteps, FitTable, Location, ModelEffect, NoiseFound, ParameterChange, Quantity, Regime, Remaining,
-    SignalReference, SignalTraces, Verdict,
+    Alternative, AugmentedModel, Curve, Detectable, EXPLANATION_FORMAT, EffectFound, EffectSize,
+    Evidence, Explanation, FitFigure, FitSteps, FitTable, Location, ModelEffect, NoiseFound,
+    ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces, Verdict,
 };
 pub use simulation::Simulation;

@@ -43,12 +43,8 @@ impl Noise {
     pub fn estimate(residual: &Series, outputs: usize, mask: &Mask, most_order: usize) -> Self {
         let ar = (0..outputs)
             .map(|o| {
-                let columns: Vec<(&Vec<f64>, &Vec<bool>)> = residual
-                    .iter()
-                    .zip(mask)
-                    .skip(o)
-                    .step_by(outputs)
-                    .collect();
+                let columns: Vec<(&Vec<f64>, &Vec<bool>)> =
+                    residual.iter().zip(mask).skip(o).step_by(outputs).collect();
                 autoregression(&columns, most_order)
             })
             .collect();
@@ -119,7 +115,8 @@ impl Noise {
     fn constant(&self) -> f64 {
         let v = self.degrees;
         if v.is_finite() {
-            -2.0 * (ln_gamma(0.5 * (v + 1.0)) - ln_gamma(0.5 * v)
+            -2.0 * (ln_gamma(0.5 * (v + 1.0))
+                - ln_gamma(0.5 * v)
                 - 0.5 * (v * std::f64::consts::PI).ln())
         } else {
             (std::f64::consts::TAU).ln()
@@ -236,14 +233,21 @@ fn filter_of_order<const P: usize>(ar: &[f64], v: &[f64], gain: f64) -> Vec<f64>
 
 /// Autoregression by Levinson and Durbin on the biased autocovariance (always stable), order by Schwarz.
 fn autoregression(columns: &[(&Vec<f64>, &Vec<bool>)], most_order: usize) -> Vec<f64> {
-    let mut covariance = vec![0.0; most_order + 1];
-    let mut n = 0usize;
+    // About the mean: a constant is an offset to be explained, not colour with a pole at one.
+    let (mut n, mut total) = (0usize, 0.0);
     for (v, mask) in columns {
-        n += mask.iter().filter(|m| **m).count();
+        for value in kept(v, mask) {
+            n += 1;
+            total += value;
+        }
+    }
+    let mean = total / n.max(1) as f64;
+    let mut covariance = vec![0.0; most_order + 1];
+    for (v, mask) in columns {
         for (lag, sum) in covariance.iter_mut().enumerate() {
             for k in lag..v.len() {
                 if mask[k] && mask[k - lag] {
-                    *sum += v[k] * v[k - lag];
+                    *sum += (v[k] - mean) * (v[k - lag] - mean);
                 }
             }
         }

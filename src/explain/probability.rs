@@ -8,7 +8,12 @@ use super::inquiry::{Finding, NEEDED};
 /// Logistic in the logarithm of the lead over the next kind of effect (or over nothing), fitted to recordings drawn by
 /// the independent simulator of `tests/concealed`; `cargo test --release --test concealed` prints the reliability.
 pub(crate) fn probability(finding: &Finding) -> f64 {
-    let named = finding.model.structure.new_effects().first().map(|e| e.definition.id);
+    let named = finding
+        .model
+        .structure
+        .new_effects()
+        .first()
+        .map(|e| e.definition.id);
     let lead = match finding.verdict {
         Verdict::Named | Verdict::Family => {
             let next = finding

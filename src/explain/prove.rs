@@ -11,7 +11,7 @@ use super::noise::Mask;
 /// Blocks that are held out, spread over the recording.
 const BLOCKS: usize = 5;
 /// Share of the recording that they make up.
-const SHARE: f64 = 0.25;
+pub(crate) const SHARE: f64 = 0.25;
 /// Draws of the bootstrap.
 const DRAWS: usize = 500;
 /// Pieces that it draws, in total: each many correlation times long.
@@ -54,7 +54,13 @@ pub(crate) fn refit(problem: &Problem, fit: &Fit, train: &Mask) -> Option<Fit> {
         mask: train.clone(),
         ..problem.clone()
     };
-    Fit::run(&without, fit.structure.clone(), fit.theta.clone(), Some(&fit.noise), Effort::RANK)
+    Fit::run(
+        &without,
+        fit.structure.clone(),
+        fit.theta.clone(),
+        Some(&fit.noise),
+        Effort::RANK,
+    )
 }
 
 /// Fit figure of one output over the samples of `mask`.
@@ -94,7 +100,13 @@ pub(crate) struct Steps<'a> {
 }
 
 /// The table row for the samples of `mask`.
-pub(crate) fn steps(data: &Data, steps: &Steps, mask: &Mask, output: usize, seed: Option<u64>) -> FitSteps {
+pub(crate) fn steps(
+    data: &Data,
+    steps: &Steps,
+    mask: &Mask,
+    output: usize,
+    seed: Option<u64>,
+) -> FitSteps {
     let augmented = figure(data, steps.augmented, mask, output);
     let rmse = augmented.rmse * (1.0 - steps.structure_share).max(0.0).sqrt();
     let lost = 100.0 - augmented.fit_percent;
@@ -111,12 +123,21 @@ pub(crate) fn steps(data: &Data, steps: &Steps, mask: &Mask, output: usize, seed
 }
 
 /// Paired block bootstrap of the decrease of the root mean square error.
-fn improvement(steps: &Steps, mask: &Mask, outputs: usize, output: usize, seed: u64) -> Option<[f64; 2]> {
+fn improvement(
+    steps: &Steps,
+    mask: &Mask,
+    outputs: usize,
+    output: usize,
+    seed: u64,
+) -> Option<[f64; 2]> {
     let mut pairs: Vec<(f64, f64)> = Vec::new();
     for s in (output..mask.len()).step_by(outputs) {
-        for k in 0..mask[s].len() {
-            if mask[s][k] {
-                pairs.push((steps.parameters_only[s][k].powi(2), steps.augmented[s][k].powi(2)));
+        for (k, keep) in mask[s].iter().enumerate() {
+            if *keep {
+                pairs.push((
+                    steps.parameters_only[s][k].powi(2),
+                    steps.augmented[s][k].powi(2),
+                ));
             }
         }
     }

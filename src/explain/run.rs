@@ -94,7 +94,12 @@ fn sized<const N: usize>(
             position: array(&force.position),
             rate: array(&force.rate),
             direction: array(&force.direction),
-            position_gain: force.position.iter().zip(&force.direction).map(|(c, b)| c * b).sum(),
+            position_gain: force
+                .position
+                .iter()
+                .zip(&force.direction)
+                .map(|(c, b)| c * b)
+                .sum(),
             memory: [0.0; 3],
         })
         .collect();
@@ -109,13 +114,13 @@ fn sized<const N: usize>(
             outputs[o][k] = y;
         }
         let mut next = [0.0; N];
-        for i in 0..N {
-            next[i] = dot(&a[i], &x);
+        for (next, row) in next.iter_mut().zip(&a) {
+            *next = dot(row, &x);
         }
         for (column, input) in b.iter().zip(inputs) {
             let u = input[k];
-            for i in 0..N {
-                next[i] += column[i] * u;
+            for (next, b) in next.iter_mut().zip(column) {
+                *next += b * u;
             }
         }
         if !forces.is_empty() && !next.iter().all(|v| v.abs() < DIVERGED * 1e3) {
@@ -140,8 +145,8 @@ fn sized<const N: usize>(
                 clock: *clock,
             };
             let w = (f.force.law)(&f.force.parameters, &motion, &mut f.memory);
-            for i in 0..N {
-                next[i] += f.direction[i] * w;
+            for (next, b) in next.iter_mut().zip(&f.direction) {
+                *next += b * w;
             }
         }
         x = next;

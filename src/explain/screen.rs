@@ -13,7 +13,9 @@ use super::fit::{Fit, Problem};
 use super::noise::Noise;
 use super::plant::Plant;
 use super::run::run;
-use super::structure::{Direction, Functionals, Instance, Signal, Structure, add_mode, dot, matched_sign};
+use super::structure::{
+    Direction, Functionals, Instance, Signal, Structure, add_mode, dot, matched_sign,
+};
 use crate::linalg::multiply_tn;
 
 /// Times of change that are tried over a recording.
@@ -87,7 +89,10 @@ pub(crate) fn screen(
         for template in bench.templates(definition, &signals, &lines) {
             for (bench, leads) in benches.iter().zip(&mut lists) {
                 for lead in bench.judge(&template) {
-                    match leads.iter_mut().find(|l| l.instance.is_same(&lead.instance)) {
+                    match leads
+                        .iter_mut()
+                        .find(|l| l.instance.is_same(&lead.instance))
+                    {
                         Some(known) if known.gain >= lead.gain => {}
                         Some(known) => *known = lead,
                         None => leads.push(lead),
@@ -147,7 +152,7 @@ impl<'a> Bench<'a> {
         let nuisance = DMatrix::from_vec(rows, count, flat);
         let mut gram = multiply_tn(&nuisance, &nuisance);
         for i in 0..count {
-            gram[(i, i)] += 1e-10;
+            gram[(i, i)] += 1e-9;
         }
         bench.nuisance_inverse = gram.cholesky()?.inverse();
         bench.nuisance = nuisance;
@@ -165,7 +170,12 @@ impl<'a> Bench<'a> {
     fn flatten(&self, series: &Series) -> Vec<f64> {
         let mut flat = Vec::with_capacity(self.weights.len());
         for (column, mask) in self.noise.whiten(series).iter().zip(&self.problem.mask) {
-            flat.extend(column.iter().zip(mask).filter_map(|(v, keep)| keep.then_some(*v)));
+            flat.extend(
+                column
+                    .iter()
+                    .zip(mask)
+                    .filter_map(|(v, keep)| keep.then_some(*v)),
+            );
         }
         for (v, w) in flat.iter_mut().zip(&self.weights) {
             *v *= w;
@@ -223,10 +233,21 @@ impl<'a> Bench<'a> {
             .collect();
         for (index, segment) in self.data().segments.iter().enumerate() {
             let x0 = self.basis.structure.initial_state(&self.basis.theta, index);
-            let (inputs, _) = self.basis.structure.effective_inputs(&self.basis.theta, segment, &self.clock(index));
+            let (inputs, _) = self.basis.structure.effective_inputs(
+                &self.basis.theta,
+                segment,
+                &self.clock(index),
+            );
             let forces = self.basis.structure.prepare(&self.basis.theta, &self.plant);
-            let read = run(&reader, &forces, x0, &inputs, segment.samples(), &self.clock(index))
-                .unwrap_or_else(|| vec![vec![0.0; segment.samples()]; reader.outputs]);
+            let read = run(
+                &reader,
+                &forces,
+                x0,
+                &inputs,
+                segment.samples(),
+                &self.clock(index),
+            )
+            .unwrap_or_else(|| vec![vec![0.0; segment.samples()]; reader.outputs]);
             for (signals, pair) in found.iter_mut().zip(read.chunks_exact(2)) {
                 signals.position.push(pair[0].clone());
                 signals.rate.push(pair[1].clone());
@@ -274,7 +295,12 @@ impl<'a> Bench<'a> {
         peaks
     }
 
-    fn templates(&self, definition: &'static Definition, signals: &[Signals], lines: &[f64]) -> Vec<Template> {
+    fn templates(
+        &self,
+        definition: &'static Definition,
+        signals: &[Signals],
+        lines: &[f64],
+    ) -> Vec<Template> {
         match definition.action {
             Action::Input(_) => (0..self.data().signals())
                 .filter(|j| self.basis.structure.coordinates.active_inputs.contains(j))
@@ -299,7 +325,12 @@ impl<'a> Bench<'a> {
                     },
                     shape: Vec::new(),
                     columns: self.directions(
-                        &self.data().segments.iter().map(|s| s.inputs[j].clone()).collect::<Vec<_>>(),
+                        &self
+                            .data()
+                            .segments
+                            .iter()
+                            .map(|s| s.inputs[j].clone())
+                            .collect::<Vec<_>>(),
                     ),
                 })
                 .collect(),
@@ -365,10 +396,15 @@ impl<'a> Bench<'a> {
             return Vec::new();
         };
         let segments = &self.data().segments;
-        let channel = segments.iter().flat_map(|s| s.inputs[input].clone()).collect();
+        let channel = segments
+            .iter()
+            .flat_map(|s| s.inputs[input].clone())
+            .collect();
         let observed = self.observed(channel, Vec::new(), &[]);
         let b = self.plant.b_column(input);
-        let moment = super::coordinates::Derivatives::new(&self.plant).moment.swap_remove(input);
+        let moment = super::coordinates::Derivatives::new(&self.plant)
+            .moment
+            .swap_remove(input);
         (definition.starts)(&observed)
             .into_iter()
             .map(|shape| {
@@ -402,13 +438,24 @@ impl<'a> Bench<'a> {
             .collect()
     }
 
-    fn sensor_templates(&self, definition: &'static Definition, output: usize, lines: &[f64]) -> Vec<Template> {
+    fn sensor_templates(
+        &self,
+        definition: &'static Definition,
+        output: usize,
+        lines: &[f64],
+    ) -> Vec<Template> {
         let Action::Sensor(law) = definition.action else {
             return Vec::new();
         };
         let l = self.data().outputs;
         let simulated = &self.basis.simulated;
-        let channel = simulated.iter().skip(output).step_by(l).flatten().copied().collect();
+        let channel = simulated
+            .iter()
+            .skip(output)
+            .step_by(l)
+            .flatten()
+            .copied()
+            .collect();
         let observed = self.observed(channel, Vec::new(), lines);
         let change = |shape: &[f64], scale: f64| -> Series {
             simulated
@@ -458,7 +505,12 @@ impl<'a> Bench<'a> {
             .collect()
     }
 
-    fn force_templates(&self, definition: &'static Definition, needs: Needs, signals: &[Signals]) -> Vec<Template> {
+    fn force_templates(
+        &self,
+        definition: &'static Definition,
+        needs: Needs,
+        signals: &[Signals],
+    ) -> Vec<Template> {
         let Action::Force(law, ..) = definition.action else {
             return Vec::new();
         };
@@ -477,7 +529,9 @@ impl<'a> Bench<'a> {
                 (Needs::Time, _) => false,
                 (Needs::Position | Needs::Rate, Signal::Output(o)) => !speed[o],
                 (Needs::Position, Signal::Integral(o)) => speed[o],
-                (Needs::Rate, Signal::Integral(o)) => speed[o] || aperiodic && definition.id != "quadratic_drag",
+                (Needs::Rate, Signal::Integral(o)) => {
+                    speed[o] || aperiodic && definition.id != "quadratic_drag"
+                }
                 (_, Signal::Difference(i, j)) => !speed[i] && !speed[j],
             };
             if !possible {
@@ -504,7 +558,13 @@ impl<'a> Bench<'a> {
     }
 
     /// The law evaluated along the motion of the basis.
-    fn force(&self, law: effects::ForceLaw, shape: &[f64], signal: &Signals, segment: usize) -> Vec<f64> {
+    fn force(
+        &self,
+        law: effects::ForceLaw,
+        shape: &[f64],
+        signal: &Signals,
+        segment: usize,
+    ) -> Vec<f64> {
         let (x, v) = (&signal.position[segment], &signal.rate[segment]);
         let clock = self.clock(segment);
         let mut memory = [0.0; 3];
@@ -535,13 +595,25 @@ impl<'a> Bench<'a> {
             .into_iter()
             .map(|shape| {
                 let mut columns: Vec<Series> = (0..2 * l)
-                    .map(|_| self.basis.simulated.iter().map(|y| vec![0.0; y.len()]).collect())
+                    .map(|_| {
+                        self.basis
+                            .simulated
+                            .iter()
+                            .map(|y| vec![0.0; y.len()])
+                            .collect()
+                    })
                     .collect();
                 for (index, segment) in self.data().segments.iter().enumerate() {
                     for part in 0..2 {
                         let mut y = vec![vec![0.0; segment.samples()]];
                         let residues = if part == 0 { [1.0, 0.0] } else { [0.0, 1.0] };
-                        add_mode(&shape, &residues, &segment.inputs[input], &self.clock(index), &mut y);
+                        add_mode(
+                            &shape,
+                            &residues,
+                            &segment.inputs[input],
+                            &self.clock(index),
+                            &mut y,
+                        );
                         for o in 0..l {
                             columns[2 * o + part][index * l + o] = y[0].clone();
                         }
@@ -574,11 +646,22 @@ impl<'a> Bench<'a> {
                 .map(|(s, segment)| (0..segment.samples()).map(|k| f(s, k)).collect())
                 .collect()
         };
-        for &input in self.basis.structure.coordinates.active_inputs.iter().filter(|j| **j < self.problem.data.signals()) {
+        for &input in self
+            .basis
+            .structure
+            .coordinates
+            .active_inputs
+            .iter()
+            .filter(|j| **j < self.problem.data.signals())
+        {
             let b = self.plant.b_column(input);
             let mut drives: Vec<Vec<Vec<f64>>> = Vec::new();
             let u = |s: usize, k: usize| data.segments[s].inputs[input][k];
-            let channel: Vec<f64> = data.segments.iter().flat_map(|s| s.inputs[input].clone()).collect();
+            let channel: Vec<f64> = data
+                .segments
+                .iter()
+                .flat_map(|s| s.inputs[input].clone())
+                .collect();
             for (low, centre, high) in hats(&channel, 8) {
                 drives.push(per_segment(&|s, k| hat(u(s, k), low, centre, high)));
             }
@@ -599,13 +682,19 @@ impl<'a> Bench<'a> {
                 let position: Vec<f64> = signal.position.concat();
                 let rate: Vec<f64> = signal.rate.concat();
                 for (low, centre, high) in hats(&position, 8) {
-                    drives.push(per_segment(&|s, k| hat(signal.position[s][k], low, centre, high)));
+                    drives.push(per_segment(&|s, k| {
+                        hat(signal.position[s][k], low, centre, high)
+                    }));
                 }
                 for (low, centre, high) in hats(&rate, 8) {
-                    drives.push(per_segment(&|s, k| hat(signal.rate[s][k], low, centre, high)));
+                    drives.push(per_segment(&|s, k| {
+                        hat(signal.rate[s][k], low, centre, high)
+                    }));
                 }
                 drives.push(per_segment(&|s, k| signal.position[s][k] * u(s, k)));
-                drives.push(per_segment(&|s, k| signal.position[s][k] * signal.rate[s][k]));
+                drives.push(per_segment(&|s, k| {
+                    signal.position[s][k] * signal.rate[s][k]
+                }));
                 let size = effects::level(&position, 0.8, f64::abs);
                 for share in [0.03, 0.2] {
                     drives.push(
@@ -626,11 +715,17 @@ impl<'a> Bench<'a> {
                 }
             }
             for block in 0..8usize {
-                let inside = |s: usize, k: usize| usize::from(k * 8 / data.segments[s].samples().max(1) == block) as f64;
+                let inside = |s: usize, k: usize| {
+                    usize::from(k * 8 / data.segments[s].samples().max(1) == block) as f64
+                };
                 drives.push(per_segment(&inside));
                 drives.push(per_segment(&|s, k| inside(s, k) * u(s, k)));
             }
-            columns.extend(drives.iter().map(|drive| self.flatten(&self.response(&b, drive))));
+            columns.extend(
+                drives
+                    .iter()
+                    .map(|drive| self.flatten(&self.response(&b, drive))),
+            );
         }
         let count = columns.len();
         let rows = self.weights.len();
@@ -645,7 +740,9 @@ impl<'a> Bench<'a> {
         let gram = multiply_tn(&columns, &columns);
         let inner = columns.tr_mul(&self.residual);
         // Features that the nuisance or one another explain are no features: keep the directions that stand out.
-        let scaled = DMatrix::from_fn(count, count, |i, j| gram[(i, j)] / (before[i] * before[j]).sqrt());
+        let scaled = DMatrix::from_fn(count, count, |i, j| {
+            gram[(i, j)] / (before[i] * before[j]).sqrt()
+        });
         let right = DVector::from_iterator(count, (0..count).map(|i| inner[i] / before[i].sqrt()));
         let eigen = crate::linalg::symmetric_eigen(&scaled).ok()?;
         let mut gained = 0.0;
@@ -671,17 +768,31 @@ impl<'a> Bench<'a> {
         let m = knots.len();
         let columns: Vec<Vec<f64>> = (0..m)
             .map(|i| {
-                let low = if i == 0 { f64::NEG_INFINITY } else { knots[i - 1] };
-                let high = if i + 1 == m { f64::INFINITY } else { knots[i + 1] };
+                let low = if i == 0 {
+                    f64::NEG_INFINITY
+                } else {
+                    knots[i - 1]
+                };
+                let high = if i + 1 == m {
+                    f64::INFINITY
+                } else {
+                    knots[i + 1]
+                };
                 let force: Vec<Vec<f64>> = values
                     .iter()
                     .map(|v| {
                         v.iter()
                             .map(|v| {
-                                if (i == 0 && *v <= knots[0]) || (i + 1 == m && *v >= knots[m - 1]) {
+                                if (i == 0 && *v <= knots[0]) || (i + 1 == m && *v >= knots[m - 1])
+                                {
                                     1.0
                                 } else {
-                                    hat(*v, low.max(knots[0] - 1.0), knots[i], high.min(knots[m - 1] + 1.0))
+                                    hat(
+                                        *v,
+                                        low.max(knots[0] - 1.0),
+                                        knots[i],
+                                        high.min(knots[m - 1] + 1.0),
+                                    )
                                 }
                             })
                             .collect()
@@ -692,7 +803,10 @@ impl<'a> Bench<'a> {
             .collect();
         let rows = self.weights.len();
         let raw = DMatrix::from_vec(rows, m, columns.concat());
-        let scale = raw.column_iter().map(|c| c.norm_squared()).fold(0.0, f64::max);
+        let scale = raw
+            .column_iter()
+            .map(|c| c.norm_squared())
+            .fold(0.0, f64::max);
         let columns = self.projected(&raw);
         let mut gram = multiply_tn(&columns, &columns);
         // A ridge far below what the data determine: the straight line belongs to the plant.
@@ -704,14 +818,19 @@ impl<'a> Bench<'a> {
         let coefficients = &inverse * &inner;
         let gain = coefficients.dot(&inner);
         let variance = (self.left - gain).max(0.0) / (rows as f64 - m as f64).max(1.0);
-        gain.is_finite().then(|| (gain, coefficients, inverse * variance))
+        gain.is_finite()
+            .then(|| (gain, coefficients, inverse * variance))
     }
 
     /// What a template gains, with starting values; a force also matched with each input.
     fn judge(&self, template: &Template) -> Vec<Lead> {
         let rows = self.weights.len();
         let m = template.columns.len();
-        let flat: Vec<f64> = template.columns.iter().flat_map(|c| self.flatten(c)).collect();
+        let flat: Vec<f64> = template
+            .columns
+            .iter()
+            .flat_map(|c| self.flatten(c))
+            .collect();
         let columns = DMatrix::from_vec(rows, m, flat);
         let before: Vec<f64> = (0..m).map(|i| columns.column(i).norm_squared()).collect();
         let columns = self.projected(&columns);
@@ -724,19 +843,32 @@ impl<'a> Bench<'a> {
         let Action::Force(..) = template.instance.definition.action else {
             return leads;
         };
-        for &input in self.basis.structure.coordinates.active_inputs.iter().filter(|j| **j < self.problem.data.signals()) {
+        for &input in self
+            .basis
+            .structure
+            .coordinates
+            .active_inputs
+            .iter()
+            .filter(|j| **j < self.problem.data.signals())
+        {
             let b = DVector::from_vec(self.plant.b_column(input));
             let square = (b.transpose() * &gram * &b)[(0, 0)];
             let along = b.dot(&inner);
             let size: f64 = b.iter().zip(&before).map(|(b, s)| b.abs() * s.sqrt()).sum();
-            if !(square > 1e-8 * size * size) {
+            if square.is_nan() || square <= 1e-8 * size * size {
                 continue;
             }
             let instance = Instance {
                 direction: Direction::Matched(input),
                 ..template.instance
             };
-            leads.extend(self.lead(template, instance, &[along / square], along * along / square, 1));
+            leads.extend(self.lead(
+                template,
+                instance,
+                &[along / square],
+                along * along / square,
+                1,
+            ));
         }
         leads
     }
@@ -837,7 +969,8 @@ fn solve(gram: &DMatrix<f64>, inner: &DVector<f64>, before: &[f64]) -> Option<(V
     let solved = scaled.cholesky()?.solve(&right);
     let gained = solved.dot(&right);
     let coefficients: Vec<f64> = (0..m).map(|i| solved[i] / scale[i]).collect();
-    (gained.is_finite() && coefficients.iter().all(|c| c.is_finite())).then_some((coefficients, gained))
+    (gained.is_finite() && coefficients.iter().all(|c| c.is_finite()))
+        .then_some((coefficients, gained))
 }
 
 /// The structure of `basis` with one more effect, and its starting vector.

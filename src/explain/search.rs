@@ -38,7 +38,9 @@ impl Boring {
     /// All of them around `structure`, the simulation as it is known.
     pub fn fit(problem: &Problem, structure: &Structure) -> Option<Self> {
         let count = problem.count();
-        let fit = |structure: Structure, theta: Vec<f64>| Fit::run(problem, structure, theta, None, Effort::FINAL);
+        let fit = |structure: Structure, theta: Vec<f64>| {
+            Fit::run(problem, structure, theta, None, Effort::FINAL)
+        };
         let with = |plant_free, initial_free| {
             let structure = Structure {
                 plant_free,
@@ -63,7 +65,10 @@ impl Boring {
                 let mut structure = near.structure.clone();
                 structure.adjusted = list.len();
                 let mut theta = near.theta.clone();
-                theta.extend(list.iter().flat_map(|i| vec![0.0; i.len(structure.states(), structure.outputs())]));
+                theta.extend(
+                    list.iter()
+                        .flat_map(|i| vec![0.0; i.len(structure.states(), structure.outputs())]),
+                );
                 structure.effects.extend(list);
                 fit(structure, theta)
             })
@@ -232,7 +237,13 @@ pub(crate) fn single_effects(
         .into_par_iter()
         .map(|r| {
             let noise = r.fit.noise.clone();
-            let better = Fit::run(problem, r.fit.structure.clone(), r.fit.theta.clone(), Some(&noise), Effort::RANK);
+            let better = Fit::run(
+                problem,
+                r.fit.structure.clone(),
+                r.fit.theta.clone(),
+                Some(&noise),
+                Effort::RANK,
+            );
             match better {
                 Some(fit) if fit.deviance < r.fit.deviance => Ranked {
                     criterion: fit.criterion(count),
@@ -251,7 +262,10 @@ fn shortlist(leads: Vec<Lead>, effects: usize, places: usize) -> Vec<Lead> {
     let mut kept: Vec<Lead> = Vec::new();
     for lead in leads.into_iter().filter(|l| l.gain > HOPELESS) {
         let id = lead.instance.definition.id;
-        let same = kept.iter().filter(|l| l.instance.definition.id == id).count();
+        let same = kept
+            .iter()
+            .filter(|l| l.instance.definition.id == id)
+            .count();
         let mut ids: Vec<&str> = kept.iter().map(|l| l.instance.definition.id).collect();
         ids.sort_unstable();
         ids.dedup();
@@ -264,14 +278,76 @@ fn shortlist(leads: Vec<Lead>, effects: usize, places: usize) -> Vec<Lead> {
 }
 
 /// Fits one lead; times of change are scanned to the sample, since no gradient finds them from afar.
-pub(crate) fn fit_lead(problem: &Problem, structure: Structure, start: Vec<f64>, effort: Effort) -> Option<Fit> {
+pub(crate) fn fit_lead(
+    problem: &Problem,
+    structure: Structure,
+    start: Vec<f64>,
+    effort: Effort,
+) -> Option<Fit> {
+    let start = best_size(problem, &structure, start);
     let fit = Fit::run(problem, structure, start, None, effort)?;
     let Some(at) = change_time(&fit.structure) else {
         return Some(fit);
     };
     let scanned = scan(problem, &fit, at)?;
-    let better = Fit::run(problem, fit.structure.clone(), scanned, Some(&fit.noise), effort)?;
-    Some(if better.deviance < fit.deviance { better } else { fit })
+    let better = Fit::run(
+        problem,
+        fit.structure.clone(),
+        scanned,
+        Some(&fit.noise),
+        effort,
+    )?;
+    Some(if better.deviance < fit.deviance {
+        better
+    } else {
+        fit
+    })
+}
+
+/// The start whose size fits best: for laws that grow with their first number (delays, widths), whose gradient only
+/// knows the neighbourhood.
+fn best_size(problem: &Problem, structure: &Structure, start: Vec<f64>) -> Vec<f64> {
+    let Some(effect) = structure.effects.last() else {
+        return start;
+    };
+    if !effect.definition.grows_with_first() {
+        return start;
+    }
+    let index = structure.effects.len() - 1;
+    let at = structure.effect_offset(index) + effect.amplitudes(structure.states());
+    let logarithmic = effect.definition.parameters[0].logarithmic;
+    let h = problem.data.sample_time;
+    let sizes: Vec<f64> = if effect.definition.parameters[0].unit == Unit::Second {
+        [0.1, 0.3, 0.7, 1.3, 2.0, 3.0, 4.5, 7.0]
+            .map(|samples| samples * h)
+            .to_vec()
+    } else {
+        let own = if logarithmic {
+            start[at].exp()
+        } else {
+            start[at]
+        };
+        [0.25, 0.5, 2.0, 4.0].map(|factor| factor * own).to_vec()
+    };
+    let cost = |theta: &[f64]| -> f64 {
+        structure
+            .simulate(theta, problem.data)
+            .map_or(f64::INFINITY, |simulated| {
+                let residual = problem.data.residual(&simulated);
+                Noise::white(&residual, problem.data.outputs, &problem.mask)
+                    .deviance(&residual, &problem.mask)
+            })
+    };
+    let mut best = (cost(&start), start);
+    for size in sizes {
+        let mut trial = best.1.clone();
+        trial[at] = if logarithmic { size.ln() } else { size };
+        let now = cost(&trial);
+        if now < best.0 {
+            best = (now, trial);
+        }
+    }
+    best.1
 }
 
 /// Index of the time of change of the last effect, if it has one.
@@ -325,9 +401,15 @@ pub(crate) fn second_effects(
         .enumerate()
         .flat_map_iter(|(index, first)| {
             let mut basis = first.fit.clone();
-            let taken: Vec<&str> = basis.structure.effects.iter().map(|e| e.definition.id).collect();
+            let taken: Vec<&str> = basis
+                .structure
+                .effects
+                .iter()
+                .map(|e| e.definition.id)
+                .collect();
             let noise = basis.noise.clone();
-            let other = |d: &Definition| allowed(d) && !taken.contains(&d.id) && d.id != "extra_mode";
+            let other =
+                |d: &Definition| allowed(d) && !taken.contains(&d.id) && d.id != "extra_mode";
             screen(problem, &mut basis, &[noise], &other)
                 .into_iter()
                 .flat_map(|list| shortlist(list, SECONDS_EACH, 1))

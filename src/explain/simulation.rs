@@ -9,6 +9,7 @@ use super::effects::{Action, Definition};
 use super::error::ExplainError;
 use super::fit::{Effort, Fit, Problem};
 use super::plant::Plant;
+use super::rebaseline::{rebaseline, shifted};
 use super::run::MOST_STATES;
 use super::search::{Boring, single_effects};
 use super::structure::Structure;
@@ -81,10 +82,15 @@ pub(crate) fn know(recordings: &[Log], simulation: &Simulation) -> Result<Known,
             states,
         });
     }
-    if known.structure.simulate(&known.structure.given(), &known.data).is_none() {
+    if known
+        .structure
+        .simulate(&known.structure.given(), &known.data)
+        .is_none()
+    {
         return Err(ExplainError::Unstable {
             name: simulation_name(simulation),
-            radius: spectral_radius(&known.structure.coordinates.given.a_matrix()).unwrap_or(f64::NAN),
+            radius: spectral_radius(&known.structure.coordinates.given.a_matrix())
+                .unwrap_or(f64::NAN),
         });
     }
     Ok(known)
@@ -128,7 +134,11 @@ fn of_model(recordings: &[Log], model: &Model, name: &str) -> Result<Known, Expl
             simulated: system.sample_time,
         });
     }
-    let known = model.inputs.iter().chain(&model.outputs).map(|c| &c.channel);
+    let known = model
+        .inputs
+        .iter()
+        .chain(&model.outputs)
+        .map(|c| &c.channel);
     for (ours, theirs) in first.inputs.iter().chain(&first.outputs).zip(known) {
         check_unit(name, ours, theirs)?;
     }
@@ -139,7 +149,32 @@ fn of_model(recordings: &[Log], model: &Model, name: &str) -> Result<Known, Expl
     };
     let mut data = data_of(recordings, &delays);
     let mut plant = Plant::from_state_space(system);
-    let level = |list: &[crate::identify::IdentifiedChannel]| -> Vec<f64> { list.iter().map(|c| c.level).collect() };
+    if model.summary.is_some() && system.inputs() == 1 && system.outputs() == 1 {
+        // Identified from data: a linear baseline is found again by simulation error.
+        let mut plain = data_of(recordings, &[0]);
+        trimmed(&mut plain);
+        for segment in &mut plain.segments {
+            let samples = segment.samples();
+            segment.inputs.push(vec![1.0; samples]);
+        }
+        plain.inputs += 1;
+        plain.constant = true;
+        if let Some((plant, delay)) = rebaseline(&plain) {
+            let data = shifted(&plain, delay);
+            if let Some((initial, _)) = super::baseline::initial_states(&plant, &data) {
+                return Ok(Known {
+                    structure: bare(&plant, &initial),
+                    data,
+                    delays: vec![delay],
+                    relative: false,
+                });
+            }
+        }
+    }
+    trimmed(&mut data);
+    let level = |list: &[crate::identify::IdentifiedChannel]| -> Vec<f64> {
+        list.iter().map(|c| c.level).collect()
+    };
     let (u_level, y_level) = (level(&model.inputs), level(&model.outputs));
     if u_level.iter().chain(&y_level).any(|v| *v != 0.0) {
         add_constant(&mut data, &mut plant, &u_level, &y_level);
@@ -153,6 +188,44 @@ fn of_model(recordings: &[Log], model: &Model, name: &str) -> Result<Known, Expl
     })
 }
 
+/// Samples that are explained, at most: more than a name needs (250 to 2000, math/explain.md), and quick.
+const MOST_SAMPLES: usize = 8000;
+
+/// Cuts each recording to the stretch in which the outputs vary most.
+fn trimmed(data: &mut Data) {
+    let most = (MOST_SAMPLES / data.segments.len().max(1)).max(1000);
+    let scale = data.output_scale();
+    for segment in &mut data.segments {
+        let n = segment.samples();
+        if n <= most + most / 4 {
+            continue;
+        }
+        let mut best = (f64::NEG_INFINITY, 0);
+        let mut from = 0;
+        while from + most <= n {
+            let size: f64 = segment
+                .outputs
+                .iter()
+                .zip(&scale)
+                .map(|(y, s)| {
+                    y[from..from + most]
+                        .iter()
+                        .map(|v| (v / s).abs())
+                        .fold(0.0, f64::max)
+                })
+                .sum();
+            if size > best.0 * 1.01 {
+                best = (size, from);
+            }
+            from += most / 4;
+        }
+        for channel in segment.inputs.iter_mut().chain(&mut segment.outputs) {
+            *channel = channel[best.1..best.1 + most].to_vec();
+        }
+        segment.start_time += best.1 as f64 * data.sample_time;
+    }
+}
+
 /// Operating points as a constant input: `x+ = A x + B (u - u0)`, `y = y0 + C x + D (u - u0)`. Laws then see the
 /// channels with their physical zero.
 fn add_constant(data: &mut Data, plant: &mut Plant, u_level: &[f64], y_level: &[f64]) {
@@ -162,7 +235,10 @@ fn add_constant(data: &mut Data, plant: &mut Plant, u_level: &[f64], y_level: &[
             .flat_map(|i| {
                 let row = &matrix[i * r..(i + 1) * r];
                 let shift: f64 = row.iter().zip(u_level).map(|(b, u)| b * u).sum();
-                row.iter().copied().chain([level(i) - shift]).collect::<Vec<_>>()
+                row.iter()
+                    .copied()
+                    .chain([level(i) - shift])
+                    .collect::<Vec<_>>()
             })
             .collect()
     };
@@ -267,16 +343,32 @@ fn of_outputs(recordings: &[Log], logs: &[Log]) -> Result<Known, ExplainError> {
 
 /// The effect that a nonlinear simulator holds, learnt from its noise-free outputs. What is missed even so is taken off
 /// the recording, so that it cancels.
-fn learn_nonlinear(mut data: Data, noise_free: &Data, structure: &Structure, simulator: &Simulator) -> Option<Known> {
+fn learn_nonlinear(
+    mut data: Data,
+    noise_free: &Data,
+    structure: &Structure,
+    simulator: &Simulator,
+) -> Option<Known> {
     let mut problem = Problem::new(noise_free);
     problem.noise_order = 0;
     let boring = Boring::fit(&problem, structure)?;
-    let physical =
-        |d: &Definition| d.persists && matches!(d.action, Action::Force(..) | Action::Input(_) | Action::Sensor(_));
+    let physical = |d: &Definition| {
+        d.persists
+            && matches!(
+                d.action,
+                Action::Force(..) | Action::Input(_) | Action::Sensor(_)
+            )
+    };
     let ranked = single_effects(&problem, &boring, &physical);
     let best = ranked.into_iter().next()?.fit;
-    let best = Fit::run(&problem, best.structure.clone(), best.theta.clone(), Some(&best.noise), Effort::FINAL)
-        .unwrap_or(best);
+    let best = Fit::run(
+        &problem,
+        best.structure.clone(),
+        best.theta.clone(),
+        Some(&best.noise),
+        Effort::FINAL,
+    )
+    .unwrap_or(best);
     let fitted = &best.structure;
     let initial: Vec<Vec<f64>> = (0..noise_free.segments.len())
         .map(|s| fitted.initial_state(&best.theta, s).to_vec())
@@ -297,7 +389,11 @@ fn learn_nonlinear(mut data: Data, noise_free: &Data, structure: &Structure, sim
     };
     let missed: Series = noise_free.residual(&structure.simulate(&[], noise_free)?);
     let size: f64 = missed.iter().flatten().map(|v| v * v).sum();
-    let there: f64 = noise_free.outputs_as_series().flatten().map(|v| v * v).sum();
+    let there: f64 = noise_free
+        .outputs_as_series()
+        .flatten()
+        .map(|v| v * v)
+        .sum();
     if size > UNDERSTOOD * UNDERSTOOD * there && simulator.misfit > UNDERSTOOD {
         return None;
     }

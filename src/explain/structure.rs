@@ -74,7 +74,9 @@ impl Instance {
 
     /// All its numbers.
     pub fn len(&self, states: usize, outputs: usize) -> usize {
-        self.amplitudes(states) + self.definition.parameters.len() + self.coefficients(states, outputs)
+        self.amplitudes(states)
+            + self.definition.parameters.len()
+            + self.coefficients(states, outputs)
     }
 }
 
@@ -109,9 +111,15 @@ impl Structure {
 
     /// Numbers before those of the effects.
     pub fn linear_len(&self) -> usize {
-        (if self.plant_free { self.coordinates.len() } else { 0 })
-            + (if self.initial_free { self.states() * self.initial.len() } else { 0 })
-            + self.feedthrough_len()
+        (if self.plant_free {
+            self.coordinates.len()
+        } else {
+            0
+        }) + (if self.initial_free {
+            self.states() * self.initial.len()
+        } else {
+            0
+        }) + self.feedthrough_len()
     }
 
     /// Numbers of `D` that are free: those of the active inputs.
@@ -193,10 +201,15 @@ impl Structure {
         let mut bounds = vec![open; self.linear_len()];
         for effect in &self.effects[self.free_effects()] {
             let amplitude = match (effect.definition.action, effect.direction) {
-                (Action::Force(_, _, super::effects::Sense::Resists), Direction::Matched(_)) => (0.0, f64::INFINITY),
+                (Action::Force(_, _, super::effects::Sense::Resists), Direction::Matched(_)) => {
+                    (0.0, f64::INFINITY)
+                }
                 _ => open,
             };
-            bounds.extend(std::iter::repeat_n(amplitude, effect.amplitudes(self.states())));
+            bounds.extend(std::iter::repeat_n(
+                amplitude,
+                effect.amplitudes(self.states()),
+            ));
             bounds.extend(effect.definition.parameters.iter().map(|p| {
                 if p.logarithmic {
                     (p.lower.ln(), p.upper.ln())
@@ -220,7 +233,12 @@ impl Structure {
             if count > 0 {
                 let l = plant.outputs;
                 let numbers = &theta[self.linear_len() - count..];
-                for (&input, column) in self.coordinates.active_inputs.iter().zip(numbers.chunks_exact(l)) {
+                for (&input, column) in self
+                    .coordinates
+                    .active_inputs
+                    .iter()
+                    .zip(numbers.chunks_exact(l))
+                {
                     for (o, d) in column.iter().enumerate() {
                         plant.d[o * plant.inputs + input] = *d;
                     }
@@ -236,7 +254,11 @@ impl Structure {
     pub fn initial_state<'a>(&'a self, theta: &'a [f64], index: usize) -> &'a [f64] {
         let n = self.states();
         if self.initial_free {
-            let from = (if self.plant_free { self.coordinates.len() } else { 0 }) + n * index;
+            let from = (if self.plant_free {
+                self.coordinates.len()
+            } else {
+                0
+            }) + n * index;
             &theta[from..from + n]
         } else {
             &self.initial[index]
@@ -257,12 +279,22 @@ impl Structure {
     }
 
     /// Direction through which force `index` enters, amplitude included (`n`).
-    pub fn direction(&self, theta: &[f64], plant: &Plant, rows: &Functionals, index: usize) -> Vec<f64> {
+    pub fn direction(
+        &self,
+        theta: &[f64],
+        plant: &Plant,
+        rows: &Functionals,
+        index: usize,
+    ) -> Vec<f64> {
         let numbers = self.effect_numbers(theta, index);
         match self.effects[index].direction {
             Direction::Free => numbers[..self.states()].to_vec(),
             Direction::Matched(input) => {
-                let sign = matched_sign(plant, &rows.of(plant, self.effects[index].signal).rate, input);
+                let sign = matched_sign(
+                    plant,
+                    &rows.of(plant, self.effects[index].signal).rate,
+                    input,
+                );
                 plant
                     .b_column(input)
                     .iter()
@@ -290,7 +322,13 @@ impl Structure {
     }
 
     /// Outputs on a new input from the initial state `x0`.
-    pub fn simulate_fresh(&self, theta: &[f64], segment: &Segment, sample_time: f64, x0: &[f64]) -> Option<Series> {
+    pub fn simulate_fresh(
+        &self,
+        theta: &[f64],
+        segment: &Segment,
+        sample_time: f64,
+        x0: &[f64],
+    ) -> Option<Series> {
         let plant = self.plant(theta);
         let prepared = self.prepare(theta, &plant);
         let clock = Clock {
@@ -331,13 +369,19 @@ impl Structure {
     }
 
     /// Inputs as the plant sees them, and their moments within the intervals where a law has any.
-    pub fn effective_inputs<'a>(&self, theta: &[f64], segment: &'a Segment, clock: &Clock) -> (Cow<'a, Series>, Option<Series>) {
+    pub fn effective_inputs<'a>(
+        &self,
+        theta: &[f64],
+        segment: &'a Segment,
+        clock: &Clock,
+    ) -> (Cow<'a, Series>, Option<Series>) {
         let mut inputs = Cow::Borrowed(&segment.inputs);
         let mut moments: Option<Series> = None;
         for (index, effect) in self.effects.iter().enumerate() {
             if let Action::Input(law) = effect.definition.action {
-                let moments =
-                    moments.get_or_insert_with(|| segment.inputs.iter().map(|u| vec![0.0; u.len()]).collect());
+                let moments = moments.get_or_insert_with(|| {
+                    segment.inputs.iter().map(|u| vec![0.0; u.len()]).collect()
+                });
                 law(
                     &self.shape(theta, index),
                     &mut inputs.to_mut()[effect.channel],
@@ -346,7 +390,10 @@ impl Structure {
                 );
             }
         }
-        (inputs, moments.filter(|m| m.iter().flatten().any(|v| *v != 0.0)))
+        (
+            inputs,
+            moments.filter(|m| m.iter().flatten().any(|v| *v != 0.0)),
+        )
     }
 
     fn simulate_segment(
@@ -375,15 +422,26 @@ impl Structure {
         let mut outputs = run(&with_paths, forces, x0, &inputs, segment.samples(), clock)?;
         for (index, effect) in self.effects.iter().enumerate() {
             if matches!(effect.definition.action, Action::Mode) {
-                let residues = &self.effect_numbers(theta, index)[effect.definition.parameters.len()..];
-                add_mode(&self.shape(theta, index), residues, &inputs[effect.channel], clock, &mut outputs);
+                let residues =
+                    &self.effect_numbers(theta, index)[effect.definition.parameters.len()..];
+                add_mode(
+                    &self.shape(theta, index),
+                    residues,
+                    &inputs[effect.channel],
+                    clock,
+                    &mut outputs,
+                );
             }
         }
         for (index, effect) in self.effects.iter().enumerate() {
             if let Action::Sensor(law) = effect.definition.action
                 && (effect.definition.persists || !clock.fresh)
             {
-                law(&self.shape(theta, index), &mut outputs[effect.channel], clock);
+                law(
+                    &self.shape(theta, index),
+                    &mut outputs[effect.channel],
+                    clock,
+                );
             }
         }
         Some(outputs)
@@ -398,7 +456,13 @@ pub(crate) fn with_moments(plant: &Plant) -> Plant {
     wider.inputs = 2 * r;
     wider.b = (0..n)
         .flat_map(|i| (0..2 * r).map(move |j| (i, j)))
-        .map(|(i, j)| if j < r { plant.b[i * r + j] } else { moment[j - r][i] })
+        .map(|(i, j)| {
+            if j < r {
+                plant.b[i * r + j]
+            } else {
+                moment[j - r][i]
+            }
+        })
         .collect();
     wider.d = (0..l)
         .flat_map(|o| (0..2 * r).map(move |j| (o, j)))
@@ -408,7 +472,13 @@ pub(crate) fn with_moments(plant: &Plant) -> Plant {
 }
 
 /// Adds the response of a second-order mode, `q+ = p q + (1 - |p|) u`, `y += a Re q + b Im q`.
-pub(crate) fn add_mode(shape: &[f64], residues: &[f64], input: &[f64], clock: &Clock, outputs: &mut Series) {
+pub(crate) fn add_mode(
+    shape: &[f64],
+    residues: &[f64],
+    input: &[f64],
+    clock: &Clock,
+    outputs: &mut Series,
+) {
     let w = std::f64::consts::TAU * shape[0] * clock.step;
     let damping = shape[1].min(0.999);
     let radius = (-damping * w).exp();
@@ -465,7 +535,8 @@ impl Functionals {
 
     pub fn of(&self, plant: &Plant, signal: Signal) -> SignalRows {
         let d = &self.derivatives;
-        let minus = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
+        let minus =
+            |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
         match signal {
             Signal::Output(o) => SignalRows {
                 position: plant.c_row(o).to_vec(),

@@ -7,7 +7,8 @@ use crate::log::Channel;
 /// Unit of a parameter, as far as the channels' units tell.
 pub(crate) fn unit_text(unit: Unit, input: &Channel, output: &Channel, integral: bool) -> String {
     let of = |channel: &Channel| channel.unit.clone();
-    let per = |unit: Option<String>, more: &str| unit.map_or_else(String::new, |u| format!("{u}{more}"));
+    let per =
+        |unit: Option<String>, more: &str| unit.map_or_else(String::new, |u| format!("{u}{more}"));
     match unit {
         Unit::Input => per(of(input), ""),
         Unit::InputRate => per(of(input), "/s"),
@@ -39,7 +40,11 @@ pub(crate) fn number(value: f64) -> String {
 
 /// `0.42 +- 0.03 N`.
 pub(crate) fn quantity(q: &Quantity) -> String {
-    let unit = if q.unit.is_empty() { String::new() } else { format!(" {}", q.unit) };
+    let unit = if q.unit.is_empty() {
+        String::new()
+    } else {
+        format!(" {}", q.unit)
+    };
     match q.std {
         Some(std) if std > 0.0 && std < 10.0 * q.value.abs().max(1e-300) => {
             let digits = (1 - std.log10().floor() as i32).clamp(0, 9) as usize;
@@ -72,8 +77,16 @@ pub(crate) fn sentence(definition: &Definition, found: &EffectFound) -> String {
         .take(4)
         .map(|(name, q)| format!("{} {}", name.replace('_', " "), quantity(q)))
         .collect();
-    let numbers = if numbers.is_empty() { String::new() } else { format!(": {}", numbers.join(", ")) };
-    let mut text = format!("{} {}{numbers}.", definition.name, place(definition, &found.signal));
+    let numbers = if numbers.is_empty() {
+        String::new()
+    } else {
+        format!(": {}", numbers.join(", "))
+    };
+    let mut text = format!(
+        "{} {}{numbers}.",
+        definition.name,
+        place(definition, &found.signal)
+    );
     if let Some(first) = text.get_mut(0..1) {
         first.make_ascii_uppercase();
     }
@@ -113,7 +126,10 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
     }
     if !matches!(e.verdict, Verdict::Consistent | Verdict::Parameters) {
         lines.push(match e.location.time.as_slice() {
-            [] => format!("Where: {}, throughout the recording.", e.location.outputs.join(", ")),
+            [] => format!(
+                "Where: {}, throughout the recording.",
+                e.location.outputs.join(", ")
+            ),
             [first, ..] => format!(
                 "Where: {}, from {} s to {} s.",
                 e.location.outputs.join(", "),
@@ -147,7 +163,15 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
             .parameters
             .iter()
             .take(4)
-            .map(|p| format!("{} {} -> {} {}", p.name, number(p.simulation), number(p.recording), p.unit))
+            .map(|p| {
+                format!(
+                    "{} {} -> {} {}",
+                    p.name,
+                    number(p.simulation),
+                    number(p.recording),
+                    p.unit
+                )
+            })
             .collect();
         lines.push(format!("{}.", changes.join("; ").trim_end()));
     }
@@ -158,12 +182,18 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
             rival.why_not.trim_end_matches('.')
         ));
     }
-    if matches!(e.verdict, Verdict::Named | Verdict::Family | Verdict::Unexplained) {
+    if matches!(
+        e.verdict,
+        Verdict::Named | Verdict::Family | Verdict::Unexplained
+    ) {
         let gain = e.effects.first().map(|f| f.evidence.criterion_gain);
         lines.push(format!(
             "{}Probability that this is right: {}. {}",
             gain.filter(|g| *g > 0.0)
-                .map_or_else(String::new, |g| format!("Evidence {} (needed {needed:.0}). ", number(g))),
+                .map_or_else(String::new, |g| format!(
+                    "Evidence {} (needed {needed:.0}). ",
+                    number(g)
+                )),
             percent(e.probability),
             e.remaining.sentence
         ));
@@ -176,9 +206,18 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
             .detectable
             .iter()
             .take(3)
-            .map(|d| format!("{} from {:.2} %", d.effect.replace('_', " "), 100.0 * d.share_of_output))
+            .map(|d| {
+                format!(
+                    "{} from {:.2} %",
+                    d.effect.replace('_', " "),
+                    100.0 * d.share_of_output
+                )
+            })
             .collect();
-        lines.push(format!("This recording would have shown {} of the output.", list.join(", ")));
+        lines.push(format!(
+            "This recording would have shown {} of the output.",
+            list.join(", ")
+        ));
     }
     lines
 }

@@ -30,8 +30,8 @@ pub(crate) use model_document::names;
 pub use model_document::{
     DiagnosticsDocument, InvariantsDocument, MODEL_FORMAT, ModelDocument, Provenance,
 };
-pub use page::{PageError, explanation_page};
 pub use packed::CovarianceDocument;
-pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
+pub use page::{PageError, explanation_page};
 pub use read::{ReadModel, parse_model, read_model};
+pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
 pub use schema::{explanation_schema, model_schema};

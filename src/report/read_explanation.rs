@@ -26,7 +26,8 @@ pub fn read_explanation(path: &Path) -> Result<Explanation, DocumentError> {
         name: name.clone(),
         source,
     })?;
-    let text = String::from_utf8(bytes).map_err(|_| DocumentError::NotText { name: name.clone() })?;
+    let text =
+        String::from_utf8(bytes).map_err(|_| DocumentError::NotText { name: name.clone() })?;
     parse_explanation(&name, &text)
 }
 
@@ -38,7 +39,8 @@ pub fn parse_explanation(name: &str, text: &str) -> Result<Explanation, Document
     if !text.trim_start().starts_with('{') {
         return Err(no_document(name, text));
     }
-    let explanation: Explanation = serde_json::from_str(text).map_err(|error| broken(name, text, &error))?;
+    let explanation: Explanation =
+        serde_json::from_str(text).map_err(|error| advised(broken(name, text, &error)))?;
     if explanation.format != EXPLANATION_FORMAT {
         return Err(DocumentError::Format {
             name: name.to_owned(),
@@ -48,4 +50,26 @@ pub fn parse_explanation(name: &str, text: &str) -> Result<Explanation, Document
         });
     }
     Ok(explanation)
+}
+
+/// The same error with advice that fits an explanation.
+fn advised(error: DocumentError) -> DocumentError {
+    match error {
+        DocumentError::Broken {
+            name,
+            line,
+            column,
+            key,
+            message,
+            ..
+        } => DocumentError::Broken {
+            name,
+            line,
+            column,
+            key,
+            message,
+            advice: "write it again with `innovant explain --output`; `innovant schema explanation` prints the format",
+        },
+        other => other,
+    }
 }

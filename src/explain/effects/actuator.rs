@@ -127,7 +127,11 @@ pub(super) static ENTRIES: &[Definition] = &[
         linear: &[],
         persists: true,
         action: Action::Input(delay),
-        starts: |seen| [0.3, 1.0, 2.0, 4.0].map(|samples| vec![samples * seen.step]).to_vec(),
+        starts: |seen| {
+            [0.3, 1.0, 2.0, 4.0]
+                .map(|samples| vec![samples * seen.step])
+                .to_vec()
+        },
     },
     Definition {
         id: "actuator_lag",
@@ -142,7 +146,11 @@ pub(super) static ENTRIES: &[Definition] = &[
         linear: &[],
         persists: true,
         action: Action::Input(lag),
-        starts: |seen| [0.3, 1.0, 3.0, 10.0].map(|samples| vec![samples * seen.step]).to_vec(),
+        starts: |seen| {
+            [0.3, 1.0, 3.0, 10.0]
+                .map(|samples| vec![samples * seen.step])
+                .to_vec()
+        },
     },
     Definition {
         id: "input_saturation",

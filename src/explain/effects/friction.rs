@@ -174,7 +174,13 @@ fn breakaway_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 3]) -> f64 {
 /// LuGre friction.
 fn damped_breakaway_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 3]) -> f64 {
     let slow = motion.middle_rate() / p[3];
-    bristle_force(1.0 + p[2] * (-slow * slow).exp(), p[0], p[1], motion, memory)
+    bristle_force(
+        1.0 + p[2] * (-slow * slow).exp(),
+        p[0],
+        p[1],
+        motion,
+        memory,
+    )
 }
 
 /// Mean force over the interval of bristles that yield over `distance` and are damped over `time`.
@@ -183,7 +189,13 @@ fn damped_breakaway_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 3]) -
 /// position in the middle of the interval that the force brings about itself: stiff bristles would be unstable
 /// otherwise. Memory: deflection in units of the largest, the position it was last updated at, and the
 /// last force.
-fn bristle_force(strength: f64, distance: f64, time: f64, motion: &Motion, memory: &mut [f64; 3]) -> f64 {
+fn bristle_force(
+    strength: f64,
+    distance: f64,
+    time: f64,
+    motion: &Motion,
+    memory: &mut [f64; 3],
+) -> f64 {
     if motion.sample == 0 {
         memory[1] = motion.position;
     }

@@ -90,7 +90,10 @@ pub(super) static ENTRIES: &[Definition] = &[
         variant: "soft",
         name: "saturation of the sensor with a soft knee",
         equation: "y = y_true/(1 + |y_true/limit|^s)^(1/s)",
-        parameters: &[Parameter::positive("limit", Unit::Position), super::actuator::SHARPNESS],
+        parameters: &[
+            Parameter::positive("limit", Unit::Position),
+            super::actuator::SHARPNESS,
+        ],
         mimics: MIMICS,
         linear: &[],
         persists: true,

@@ -14,7 +14,11 @@ pub fn explanation_text(explanation: &Explanation) -> String {
         Verdict::Family => "FAMILY",
         Verdict::Unexplained => "UNEXPLAINED",
     };
-    let names: Vec<String> = explanation.effects.iter().map(|e| e.effect.replace('_', " ")).collect();
+    let names: Vec<String> = explanation
+        .effects
+        .iter()
+        .map(|e| e.effect.replace('_', " "))
+        .collect();
     let mut text = String::new();
     let _ = if names.is_empty() {
         writeln!(text, "{word}")

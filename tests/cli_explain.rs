@@ -1,0 +1,451 @@
+//! Questions that `innovant explain` cannot answer end in exit code 2 and one message that says where and what to do,
+//! and leave no file behind; so do explanations that cannot be simulated.
+
+mod cli_support;
+
+use cli_support::{Folder, json};
+use innovant::model::StateSpace;
+use innovant::systems;
+use serde_json::Value;
+
+const SAMPLES: usize = 600;
+
+fn servo() -> StateSpace {
+    systems::servo().system
+}
+
+/// Recorded inputs and outputs, and simulated outputs.
+struct Signals {
+    u: Vec<f64>,
+    y: Vec<f64>,
+    simulated: Vec<f64>,
+}
+
+fn signals(samples: usize) -> Signals {
+    let log = systems::servo().record(samples, 3);
+    let (u, y) = (log.input_data[0].clone(), log.output_data[0].clone());
+    let simulated = servo().simulate(&[&u], None).unwrap().remove(0);
+    Signals { u, y, simulated }
+}
+
+fn table(header: &str, sample_time: f64, columns: &[&[f64]]) -> String {
+    let mut text = format!("{header}\n");
+    for k in 0..columns[0].len() {
+        text.push_str(&(k as f64 * sample_time).to_string());
+        for column in columns {
+            text.push_str(&format!(",{}", column[k]));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn model_json(system: &StateSpace) -> String {
+    let rows = |m: &nalgebra::DMatrix<f64>| -> Vec<Vec<f64>> {
+        m.row_iter().map(|r| r.iter().copied().collect()).collect()
+    };
+    serde_json::json!({
+        "A": rows(&system.a),
+        "B": rows(&system.b),
+        "C": rows(&system.c),
+        "D": rows(&system.d),
+        "dt": system.sample_time,
+    })
+    .to_string()
+}
+
+const DT: f64 = 1e-3;
+
+/// A folder with a recording and a simulation that go together.
+fn good() -> Folder {
+    let folder = Folder::new();
+    let s = signals(SAMPLES);
+    folder.text("recording.csv", &table("t,u1,y1", DT, &[&s.u, &s.y]));
+    folder.text("simulated.csv", &table("t,y1", DT, &[&s.simulated]));
+    folder.text("model.json", &model_json(&servo()));
+    folder
+}
+
+/// The message of `explain RECORDING --simulation SIMULATION`, which leaves nothing behind.
+#[track_caller]
+fn about(folder: &Folder, recordings: &[&str], simulations: &[&str], flags: &[&str]) -> String {
+    let before = folder.files();
+    let mut arguments = vec!["explain"];
+    arguments.extend(recordings);
+    arguments.push("--simulation");
+    arguments.extend(simulations);
+    arguments.extend(flags);
+    arguments.extend(["--output", "explanation.json", "--report", "page.html"]);
+    let message = folder.run(&arguments).error();
+    assert_eq!(folder.files(), before, "{message}");
+    message
+}
+
+#[track_caller]
+fn says(message: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(message.contains(part), "`{part}` is not in: {message}");
+    }
+}
+
+#[test]
+fn simulations_of_another_length() {
+    let folder = good();
+    let s = signals(SAMPLES - 100);
+    folder.text("short.csv", &table("t,y1", DT, &[&s.simulated]));
+    says(
+        &about(&folder, &["recording.csv"], &["short.csv"], &[]),
+        &[
+            "short.csv: 500 samples",
+            "recording.csv has 600",
+            "simulate exactly",
+        ],
+    );
+}
+
+#[test]
+fn simulations_of_another_sampling() {
+    let folder = good();
+    let s = signals(SAMPLES);
+    folder.text("slow.csv", &table("t,y1", 2.0 * DT, &[&s.simulated]));
+    says(
+        &about(&folder, &["recording.csv"], &["slow.csv"], &[]),
+        &[
+            "slow.csv: sample time 0.002 s",
+            "recording.csv",
+            "0.001 s",
+            "simulate at",
+        ],
+    );
+    let slow = StateSpace {
+        sample_time: 2.0 * DT,
+        ..servo()
+    };
+    folder.text("slow.json", &model_json(&slow));
+    says(
+        &about(&folder, &["recording.csv"], &["slow.json"], &[]),
+        &["slow.json: sample time 0.002 s", "0.001 s", "simulate at"],
+    );
+}
+
+#[test]
+fn simulations_with_other_channels() {
+    let folder = good();
+    let s = signals(SAMPLES);
+    let two = table("t,y1,y2", DT, &[&s.simulated, &s.y]);
+    folder.text(
+        "two.csv",
+        &table("t,u1,y1,y2", DT, &[&s.u, &s.y, &s.simulated]),
+    );
+    says(
+        &about(&folder, &["two.csv"], &["simulated.csv"], &[]),
+        &["simulated.csv: 1 simulated outputs", "two.csv has 2"],
+    );
+    folder.text("others.csv", &two.replace("y1,y2", "y3,y4"));
+    says(
+        &about(&folder, &["recording.csv"], &["others.csv"], &[]),
+        &["others.csv", "2 simulated outputs", "--outputs"],
+    );
+    folder.text("model2.json", &model_json(&systems::two_by_two().system));
+    says(
+        &about(&folder, &["recording.csv"], &["model2.json"], &[]),
+        &["model2.json", "2 inputs", "recording.csv has 1"],
+    );
+}
+
+#[test]
+fn units_that_contradict() {
+    let folder = Folder::new();
+    let s = signals(SAMPLES);
+    folder.text(
+        "recording.csv",
+        &table("t,u1 [V],y1 [m]", DT, &[&s.u, &s.y]),
+    );
+    folder.text("simulated.csv", &table("t,y1 [mm]", DT, &[&s.simulated]));
+    says(
+        &about(&folder, &["recording.csv"], &["simulated.csv"], &[]),
+        &["simulated.csv: y1 is in mm", "in m;", "convert"],
+    );
+}
+
+#[test]
+fn recordings_that_say_too_little() {
+    let folder = good();
+    let s = signals(100);
+    folder.text("short.csv", &table("t,u1,y1", DT, &[&s.u, &s.y]));
+    folder.text("short_simulated.csv", &table("t,y1", DT, &[&s.simulated]));
+    for simulation in ["short_simulated.csv", "model.json"] {
+        says(
+            &about(&folder, &["short.csv"], &[simulation], &[]),
+            &["short.csv: 100 samples are too few", "150", "record longer"],
+        );
+    }
+    let s = signals(SAMPLES);
+    let still = vec![2.5; SAMPLES];
+    folder.text("still.csv", &table("t,u1,y1", DT, &[&s.u, &still]));
+    says(
+        &about(&folder, &["still.csv"], &["model.json"], &[]),
+        &["still.csv", "y1", "is constant"],
+    );
+}
+
+#[test]
+fn simulations_that_run_away() {
+    let folder = good();
+    let mut system = servo();
+    system.a *= 1.3;
+    folder.text("unstable.json", &model_json(&system));
+    says(
+        &about(&folder, &["recording.csv"], &["unstable.json"], &[]),
+        &[
+            "unstable.json: the simulation is unstable",
+            "spectral radius 1.2",
+            "stable model",
+        ],
+    );
+}
+
+#[test]
+fn documents_that_are_no_simulation() {
+    let folder = good();
+    for (text, parts) in [
+        (
+            "{\"A\": [[0.5]],\n \"B\": [[1",
+            &["garbage.json, line 2", "not whole"][..],
+        ),
+        (
+            "hello",
+            &["garbage.json: this is not a JSON document", "`hello`"],
+        ),
+        ("", &["garbage.json", "the file is empty"]),
+        ("[1, 2]", &["garbage.json", "not a JSON document"]),
+        (
+            "{\"A\": [[0.5]], \"dt\": 1}",
+            &["garbage.json", "there is no key `B`"],
+        ),
+        (
+            "{\"A\": 0.5, \"B\": 1, \"C\": \"x\", \"dt\": 0.001}",
+            &["garbage.json", "key `C"],
+        ),
+    ] {
+        folder.text("garbage.json", text);
+        let message = about(&folder, &["recording.csv"], &["garbage.json"], &[]);
+        says(&message, parts);
+    }
+    says(
+        &about(&folder, &["recording.csv"], &["nowhere.csv"], &[]),
+        &["nowhere.csv: cannot open", "check the path"],
+    );
+    // Outputs that have nothing to do with the inputs.
+    let noise = systems::servo().record(SAMPLES, 99);
+    folder.text("noise.csv", &table("t,y1", DT, &[&noise.input_data[0]]));
+    says(
+        &about(&folder, &["recording.csv"], &["noise.csv"], &[]),
+        &[
+            "noise.csv: no dynamic model reproduces",
+            "simulated with these inputs",
+        ],
+    );
+}
+
+#[test]
+fn options_that_are_not_possible() {
+    let folder = good();
+    says(
+        &about(
+            &folder,
+            &["recording.csv"],
+            &["simulated.csv"],
+            &["--without", "coulomb_friction,colomb_friction"],
+        ),
+        &["no effect called colomb_friction", "--help"],
+    );
+    folder.recording("recording2.csv", &systems::servo(), SAMPLES, 4);
+    says(
+        &about(
+            &folder,
+            &["recording.csv", "recording2.csv"],
+            &["simulated.csv"],
+            &[],
+        ),
+        &[
+            "2 recordings and 1 simulations",
+            "for each recording",
+            "same order",
+        ],
+    );
+    says(
+        &about(
+            &folder,
+            &["recording.csv"],
+            &["simulated.csv", "model.json"],
+            &[],
+        ),
+        &["--simulation takes one model", "one CSV a recording"],
+    );
+    says(
+        &about(&folder, &["recording.csv"], &["recording.csv"], &[]),
+        &["recording.csv", "given twice"],
+    );
+    let same = folder
+        .run(&[
+            "explain",
+            "recording.csv",
+            "--simulation",
+            "model.json",
+            "--output",
+            "same",
+            "--report",
+            "same",
+        ])
+        .error();
+    says(&same, &["same", "--output and --report"]);
+    let over = folder
+        .run(&[
+            "explain",
+            "recording.csv",
+            "--simulation",
+            "model.json",
+            "--output",
+            "model.json",
+        ])
+        .error();
+    says(&over, &["model.json"]);
+    assert_eq!(json(&folder.join("model.json"))["dt"], DT);
+}
+
+/// The help lists what `--without` takes.
+#[test]
+fn the_help_lists_the_effects() {
+    let help = Folder::new().run(&["explain", "--help"]).ok();
+    let mut missing: Vec<&str> = innovant::explain::effects::library()
+        .map(|d| d.id)
+        .filter(|id| !help.contains(id))
+        .collect();
+    missing.dedup();
+    assert!(missing.is_empty(), "not in the help: {missing:?}");
+}
+
+#[test]
+fn simulations_belong_to_explanations() {
+    let folder = good();
+    let before = folder.files();
+    let message = folder
+        .run(&[
+            "simulate",
+            "model.json",
+            "recording.csv",
+            "--simulation",
+            "simulated.csv",
+            "--output",
+            "out.csv",
+        ])
+        .error();
+    says(
+        &message,
+        &[
+            "model.json",
+            "--simulation belongs to an explanation",
+            "leave it out",
+        ],
+    );
+    assert_eq!(folder.files(), before);
+}
+
+/// An explanation, to be damaged.
+struct Whole {
+    folder: Folder,
+    document: Value,
+}
+
+impl Whole {
+    fn new() -> Self {
+        let folder = good();
+        let made = folder.run(&[
+            "explain",
+            "recording.csv",
+            "--simulation",
+            "model.json",
+            "--output",
+            "explanation.json",
+        ]);
+        assert_eq!(made.code, 0, "{}", made.stderr);
+        let document = json(&folder.join("explanation.json"));
+        Self { folder, document }
+    }
+
+    /// The message about a text in place of the explanation.
+    fn about(&self, text: &str) -> String {
+        self.folder.text("damaged.json", text);
+        let before = self.folder.files();
+        let message = self
+            .folder
+            .run(&["simulate", "damaged.json", "recording.csv", "-o", "out.csv"])
+            .error();
+        assert_eq!(self.folder.files(), before, "{message}");
+        message
+    }
+
+    /// The message about the explanation after a change.
+    fn spoilt(&self, change: impl Fn(&mut Value)) -> String {
+        let mut document = self.document.clone();
+        change(&mut document);
+        self.about(&document.to_string())
+    }
+}
+
+#[test]
+fn explanations_without_a_key() {
+    let whole = Whole::new();
+    let inner = whole.spoilt(|d| {
+        d["model"].as_object_mut().unwrap().remove("A");
+    });
+    says(
+        &inner,
+        &["damaged.json, line 1", "there is no key `A`", "key `model"],
+    );
+    let outer = whole.spoilt(|d| {
+        d.as_object_mut().unwrap().remove("model");
+    });
+    says(&outer, &["damaged.json, line 1", "there is no key `model`"]);
+    // Where the whole format is to be found.
+    for message in [inner, outer] {
+        says(&message, &["innovant schema explanation"]);
+    }
+}
+
+#[test]
+fn damaged_explanations() {
+    let whole = Whole::new();
+    let version = whole.spoilt(|d| d["format"] = "innovant-explanation/9".into());
+    says(
+        &version,
+        &[
+            "damaged.json",
+            "`innovant-explanation/9`",
+            "explain the recording again",
+        ],
+    );
+    let shape = whole.spoilt(|d| d["model"]["B"] = serde_json::json!([[1.0]]));
+    says(&shape, &["damaged.json", "B is 1 x 1", "not 3 x 1"]);
+    let time = whole.spoilt(|d| d["model"]["sample_time"] = (-1.0).into());
+    says(&time, &["damaged.json", "sample time"]);
+    let unknown = whole.spoilt(|d| {
+        d["model"]["effects"] = serde_json::json!([{
+            "effect": "phlogiston", "channel": 0, "looks_at": {"output": 0}, "parameters": [],
+        }]);
+    });
+    says(&unknown, &["damaged.json", "`phlogiston`", "does not know"]);
+    let text = whole.document.to_string();
+    let half = text[..text.len() / 2].rfind(',').unwrap();
+    says(&whole.about(&text[..=half]), &["damaged.json", "not whole"]);
+}
+
+/// An explanation is no model, and says so.
+#[test]
+fn explanations_are_no_models() {
+    let folder = good();
+    folder.text("e.json", "{\"format\": \"innovant-explanation/1\"}");
+    let message = about(&folder, &["recording.csv"], &["e.json"], &[]);
+    says(&message, &["e.json", "an explanation and not a model"]);
+}

@@ -1,0 +1,159 @@
+//! The cases of `data/concealed/` through the command line: what is said of them, that documents keep to their
+//! schema, and that an explanation that was written simulates as the one in memory.
+
+mod cli_support;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use cli_support::{Folder, columns, json};
+use innovant::explain::Explanation;
+use innovant::log::{Log, RoleNeed, Roles, Source};
+use innovant::report::{explanation_schema, parse_explanation};
+use rayon::prelude::*;
+use serde_json::Value;
+
+/// How many cases there are, and how many must be answered rightly.
+const CASES: usize = 12;
+const RIGHT: usize = 10;
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data/concealed")
+}
+
+fn cases() -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.starts_with("case_"))
+        .collect();
+    names.sort();
+    names
+}
+
+fn text(path: &Path) -> String {
+    path.to_str().unwrap().to_owned()
+}
+
+/// What was said of a case.
+struct Said {
+    case: String,
+    right: bool,
+    line: String,
+}
+
+fn ask(case: &str, validator: &jsonschema::Validator) -> Said {
+    let data = folder().join(case);
+    let truth = json(&folder().join("truth").join(format!("{case}.json")));
+    let scratch = Folder::new();
+    let recording = text(&data.join("recording.csv"));
+    let simulation = ["simulation.csv", "simulation.json"]
+        .map(|name| data.join(name))
+        .into_iter()
+        .find(|path| path.exists())
+        .unwrap();
+    let printed = scratch
+        .run(&[
+            "explain",
+            &recording,
+            "--simulation",
+            &text(&simulation),
+            "--output",
+            "explanation.json",
+        ])
+        .ok();
+    assert!(!printed.is_empty(), "{case}");
+
+    let written = fs::read_to_string(scratch.join("explanation.json")).unwrap();
+    let document: Value = serde_json::from_str(&written).unwrap();
+    let errors: Vec<String> = validator
+        .iter_errors(&document)
+        .map(|error| format!("{}: {error}", error.instance_path()))
+        .collect();
+    assert!(errors.is_empty(), "{case}: {errors:?}");
+    let explanation = parse_explanation("explanation.json", &written).unwrap();
+    assert_eq!(
+        serde_json::to_value(&explanation).unwrap(),
+        document,
+        "{case}"
+    );
+    round_trip(case, &data, &scratch, &explanation);
+
+    let verdict = document["verdict"].as_str().unwrap().to_owned();
+    let ids = |value: &Value, key: Option<&str>| -> Vec<String> {
+        value
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|v| key.map_or(v, |k| &v[k]).as_str().unwrap().to_owned())
+            .collect()
+    };
+    let named = ids(&document["effects"], Some("effect"));
+    let real = ids(&truth["effects"], None);
+    let sorted = |mut list: Vec<String>| {
+        list.sort();
+        list
+    };
+    let right = if real.is_empty() {
+        verdict == "consistent" || verdict == "parameters"
+    } else {
+        (verdict == "named" || verdict == "family") && sorted(named.clone()) == sorted(real.clone())
+    };
+    Said {
+        line: format!("{case}: {real:?}, said {verdict} {named:?}"),
+        case: case.to_owned(),
+        right,
+    }
+}
+
+/// The prediction of the command line for the fresh input is that of the library.
+fn round_trip(case: &str, data: &Path, scratch: &Folder, explanation: &Explanation) {
+    let fresh = text(&data.join("fresh_input.csv"));
+    let answer = data.join("fresh_simulation.csv");
+    let mut arguments = vec!["simulate", "explanation.json", &fresh];
+    let (answer_text, exists) = (text(&answer), answer.exists());
+    if exists {
+        arguments.extend(["--simulation", &answer_text]);
+    }
+    let (header, printed) = columns(&scratch.run(&arguments).ok());
+
+    let read = |path: &Path, need| {
+        Log::read_with(&Source::from(path.to_owned()), &Roles::default(), need).unwrap()
+    };
+    let input = read(&data.join("fresh_input.csv"), RoleNeed::InputsOnly);
+    let inputs: Vec<&[f64]> = input.input_data.iter().map(Vec::as_slice).collect();
+    let simulated = exists.then(|| read(&answer, RoleNeed::OutputsOnly));
+    let simulated: Option<Vec<&[f64]>> = simulated
+        .as_ref()
+        .map(|log| log.output_data.iter().map(Vec::as_slice).collect());
+    let outputs = explanation
+        .model
+        .simulate(&inputs, None, simulated.as_deref())
+        .unwrap();
+    assert_eq!(header.len(), outputs.len() + 1, "{case}");
+    for (ours, theirs) in outputs.iter().zip(&printed[1..]) {
+        assert_eq!(ours, theirs, "{case}");
+    }
+}
+
+#[test]
+fn concealed_cases_are_answered() {
+    let schema: Value = serde_json::from_str(&explanation_schema().unwrap()).unwrap();
+    let printed: Value = Folder::new().run(&["schema", "explanation"]).json();
+    assert_eq!(schema, printed);
+    let validator = jsonschema::draft202012::new(&schema).unwrap();
+    let said: Vec<Said> = cases()
+        .par_iter()
+        .map(|case| ask(case, &validator))
+        .collect();
+    assert_eq!(said.len(), CASES);
+    for s in &said {
+        println!("{} {}", if s.right { "right" } else { "WRONG" }, s.line);
+    }
+    let wrong: Vec<&str> = said
+        .iter()
+        .filter(|s| !s.right)
+        .map(|s| s.case.as_str())
+        .collect();
+    assert!(wrong.len() <= CASES - RIGHT, "not right: {wrong:?}");
+}

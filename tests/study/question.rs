@@ -1,0 +1,138 @@
+//! A drawn case in the types of the library.
+
+use innovant::Model;
+use innovant::explain::Simulation;
+use innovant::identify::IdentifiedChannel;
+use innovant::log::{Channel, Log};
+use innovant::model::StateSpace;
+use nalgebra::{DMatrix, DVector};
+
+use crate::concealed;
+use crate::concealed::Case;
+
+/// What `explain` is asked.
+#[derive(Debug, Clone)]
+pub struct Question {
+    pub recording: Log,
+    pub simulation: Simulation,
+}
+
+impl Question {
+    pub fn of(case: &Case) -> Self {
+        let recording = log(
+            "recording",
+            case.truth.dt,
+            &case.recording.inputs,
+            &case.recording.outputs,
+        );
+        let simulation = match &case.simulation {
+            concealed::Simulation::Model(model) => {
+                Simulation::Model(Box::new(linear(model)), "simulation".to_owned())
+            }
+            concealed::Simulation::Column(columns) => Simulation::Outputs(vec![log(
+                "simulation",
+                case.truth.dt,
+                &case.recording.inputs,
+                columns,
+            )]),
+        };
+        Self {
+            recording,
+            simulation,
+        }
+    }
+
+    /// The same question in other units: inputs `u` and outputs `y` times as large, in recording and simulation.
+    pub fn in_units(&self, u: f64, y: f64) -> Self {
+        let mut scaled = self.clone();
+        scale(&mut scaled.recording, u, y);
+        match &mut scaled.simulation {
+            Simulation::Model(model, _) => {
+                let system = &model.system;
+                let (b, c) = (&system.b / u, &system.c * y);
+                let d = &system.d * (y / u);
+                let time = system.sample_time;
+                model.system = StateSpace::deterministic(system.a.clone(), b, c, d, time).unwrap();
+            }
+            Simulation::Outputs(logs) => logs.iter_mut().for_each(|log| scale(log, u, y)),
+        }
+        scaled
+    }
+
+    /// The same question with another time of the first sample.
+    pub fn starting_at(&self, time: f64) -> Self {
+        let mut moved = self.clone();
+        moved.recording.start_time = time;
+        if let Simulation::Outputs(logs) = &mut moved.simulation {
+            logs.iter_mut().for_each(|log| log.start_time = time);
+        }
+        moved
+    }
+}
+
+fn scale(log: &mut Log, u: f64, y: f64) {
+    log.input_data
+        .iter_mut()
+        .flatten()
+        .for_each(|value| *value *= u);
+    log.output_data
+        .iter_mut()
+        .flatten()
+        .for_each(|value| *value *= y);
+}
+
+fn log(name: &str, sample_time: f64, inputs: &[Vec<f64>], outputs: &[Vec<f64>]) -> Log {
+    Log {
+        name: name.to_owned(),
+        sample_time,
+        start_time: 0.0,
+        inputs: channels("u", inputs.len()),
+        outputs: channels("y", outputs.len()),
+        input_data: inputs.to_vec(),
+        output_data: outputs.to_vec(),
+        sha256: None,
+    }
+}
+
+fn channels(letter: &str, count: usize) -> Vec<Channel> {
+    (1..=count)
+        .map(|i| Channel::new(format!("{letter}{i}")))
+        .collect()
+}
+
+/// A linear simulator as a model of the library.
+pub fn linear(model: &concealed::Model) -> Model {
+    let (inputs, outputs) = (model.d.first().map_or(0, Vec::len), model.c.len());
+    let states = model.a.len();
+    let matrix = |rows: &[Vec<f64>], columns: usize| {
+        DMatrix::from_row_iterator(rows.len(), columns, rows.iter().flatten().copied())
+    };
+    let system = StateSpace::deterministic(
+        matrix(&model.a, states),
+        matrix(&model.b, inputs),
+        matrix(&model.c, states),
+        matrix(&model.d, inputs),
+        model.dt,
+    )
+    .unwrap();
+    let identified = |letter: &str, count: usize| -> Vec<IdentifiedChannel> {
+        channels(letter, count)
+            .into_iter()
+            .map(|channel| IdentifiedChannel {
+                channel,
+                level: 0.0,
+                delay: 0,
+            })
+            .collect()
+    };
+    Model {
+        system,
+        inputs: identified("u", inputs),
+        outputs: identified("y", outputs),
+        innovation_covariance: None,
+        initial_state: DVector::zeros(states),
+        covariance: None,
+        summary: None,
+        recordings: Vec::new(),
+    }
+}
