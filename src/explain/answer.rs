@@ -1,15 +1,12 @@
 //! From what was found to what is said.
 
-use std::collections::BTreeMap;
-
 use super::adequacy::adequacy;
 use super::curve;
 use super::data::{Data, Series};
-use super::effects::{self, Action, Definition, Port};
+use super::effects::{self, Definition, Port};
 use super::error::ExplainError;
 use super::explanation::{
-    Alternative, AugmentedModel, Detectable, EFFECTS_TIE, EXPLANATION_FORMAT, EffectFound,
-    EffectSize, Evidence, Explanation, FitTable, Location, NoiseFound, ParameterChange, Quantity,
+    AugmentedModel, EXPLANATION_FORMAT, EffectSize, Explanation, FitTable, Location, NoiseFound,
     Remaining, SignalTraces, Verdict,
 };
 use super::fit::{Fit, Problem};
@@ -19,11 +16,9 @@ use super::noise::Mask;
 use super::probability::probability;
 use super::prove;
 use super::simulation::{Known, Simulation, know};
-use super::structure::{Direction, Functionals, Signal, dot};
 use super::words;
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
-use crate::model::StateSpace;
 
 /// What can be asked for.
 #[derive(Debug, Clone, Default)]
@@ -67,28 +62,28 @@ pub fn explain(
     .say())
 }
 
-struct Answer<'a> {
-    recordings: &'a [Log],
-    known: &'a Known,
-    finding: &'a Finding,
-    mask: Mask,
-    seed: u64,
+pub(crate) struct Answer<'a> {
+    pub recordings: &'a [Log],
+    pub known: &'a Known,
+    pub finding: &'a Finding,
+    pub mask: Mask,
+    pub seed: u64,
 }
 
 impl Answer<'_> {
-    fn data(&self) -> &Data {
+    pub fn data(&self) -> &Data {
         &self.known.data
     }
 
-    fn inputs(&self) -> &[Channel] {
+    pub fn inputs(&self) -> &[Channel] {
         &self.recordings[0].inputs
     }
 
-    fn outputs(&self) -> &[Channel] {
+    pub fn outputs(&self) -> &[Channel] {
         &self.recordings[0].outputs
     }
 
-    fn names(&self) -> (Vec<String>, Vec<String>) {
+    pub fn names(&self) -> (Vec<String>, Vec<String>) {
         let of = |list: &[Channel]| list.iter().map(|c| c.name.clone()).collect();
         (of(self.inputs()), of(self.outputs()))
     }
@@ -201,214 +196,6 @@ impl Answer<'_> {
         (0..l)
             .max_by(|a, b| drop(*a).total_cmp(&drop(*b)))
             .unwrap_or(0)
-    }
-
-    fn signal_name(&self, effect: &super::structure::Instance) -> String {
-        let (inputs, outputs) = self.names();
-        match effect.definition.port() {
-            Port::Input | Port::Path => inputs.get(effect.channel).cloned().unwrap_or_default(),
-            Port::Sensor | Port::Exact => outputs.get(effect.channel).cloned().unwrap_or_default(),
-            Port::Force => match effect.signal {
-                Signal::Output(o) | Signal::Integral(o) => outputs[o].clone(),
-                Signal::Difference(i, j) => format!("{} - {}", outputs[i], outputs[j]),
-            },
-        }
-    }
-
-    fn effects(&self, problem: &Problem, model: &Fit) -> Vec<EffectFound> {
-        let mut fit = model.clone();
-        let covariance = fit.covariance(problem);
-        let mut found = Vec::new();
-        for index in model.structure.first_new()..model.structure.effects.len() {
-            let effect = &model.structure.effects[index];
-            let definition = effect.definition;
-            let signal = self.signal_name(effect);
-            let (input, output) = self.channels_of(effect);
-            let integral = matches!(effect.signal, Signal::Integral(_));
-            let offset = model.structure.effect_offset(index);
-            let std = |at: usize| covariance.as_ref().map(|c| c[(at, at)].max(0.0).sqrt());
-            let mut parameters = BTreeMap::new();
-            let amplitudes = effect.amplitudes(model.structure.states());
-            if let Action::Force(..) = definition.action {
-                self.amplitude(model, index, covariance.as_ref(), &mut parameters);
-            }
-            for (i, p) in definition.parameters.iter().enumerate() {
-                let at = offset + amplitudes + i;
-                let value = model.structure.shape(&model.theta, index)[i];
-                parameters.insert(
-                    p.name.to_owned(),
-                    Quantity {
-                        value,
-                        std: std(at).map(|s| if p.logarithmic { s * value } else { s }),
-                        unit: words::unit_text(p.unit, input, output, integral),
-                    },
-                );
-            }
-            let mut effect_found = EffectFound {
-                effect: definition.id.to_owned(),
-                variant: definition.variant.to_owned(),
-                signal,
-                port: port_name(definition.port()).to_owned(),
-                equation: definition.equation.to_owned(),
-                parameters,
-                evidence: Evidence {
-                    criterion_gain: self.finding.gain,
-                    criterion_needed: NEEDED,
-                    heldout_gain: None,
-                    halves_disagree: None,
-                },
-                sentence: String::new(),
-            };
-            effect_found.sentence = words::sentence(definition, &effect_found);
-            found.push(effect_found);
-        }
-        for freeze in &self.finding.freezes {
-            let time = |k: usize| {
-                self.data().segments[freeze.segment].start_time + k as f64 * self.data().sample_time
-            };
-            found.extend(self.exact(
-                "sensor_freeze",
-                freeze.output,
-                &[
-                    ("from", time(freeze.from), "s"),
-                    ("to", time(freeze.to), "s"),
-                ],
-            ));
-        }
-        if let Some((output, step)) = self.finding.coarse {
-            let unit = self.outputs()[output].unit.clone().unwrap_or_default();
-            found.extend(self.exact("sensor_quantization", output, &[("step", step, &unit)]));
-        }
-        found
-    }
-
-    fn exact(&self, id: &str, output: usize, numbers: &[(&str, f64, &str)]) -> Option<EffectFound> {
-        let definition = effects::find(id, "")?;
-        let mut found = EffectFound {
-            effect: id.to_owned(),
-            variant: String::new(),
-            signal: self.outputs()[output].name.clone(),
-            port: "sensor".to_owned(),
-            equation: definition.equation.to_owned(),
-            parameters: numbers
-                .iter()
-                .map(|(name, value, unit)| {
-                    (
-                        (*name).to_owned(),
-                        Quantity {
-                            value: *value,
-                            std: None,
-                            unit: (*unit).to_owned(),
-                        },
-                    )
-                })
-                .collect(),
-            evidence: Evidence {
-                criterion_gain: 0.0,
-                criterion_needed: 0.0,
-                heldout_gain: None,
-                halves_disagree: None,
-            },
-            sentence: String::new(),
-        };
-        found.sentence = words::sentence(definition, &found);
-        Some(found)
-    }
-
-    fn channels_of(&self, effect: &super::structure::Instance) -> (&Channel, &Channel) {
-        let input = match effect.direction {
-            Direction::Matched(input) => input,
-            Direction::Free => effect.channel.min(self.inputs().len() - 1),
-        };
-        let output = match effect.signal {
-            Signal::Output(o) | Signal::Integral(o) | Signal::Difference(o, _) => o,
-        };
-        (
-            &self.inputs()[input.min(self.inputs().len() - 1)],
-            &self.outputs()[output],
-        )
-    }
-
-    /// The amplitude of a force: in the unit of an input, through which it acts or to which it is compared by what both
-    /// do to the rate.
-    fn amplitude(
-        &self,
-        model: &Fit,
-        index: usize,
-        covariance: Option<&nalgebra::DMatrix<f64>>,
-        parameters: &mut BTreeMap<String, Quantity>,
-    ) {
-        let structure = &model.structure;
-        let effect = &structure.effects[index];
-        let plant = structure.plant(&model.theta);
-        let rows = Functionals::new(&plant);
-        let rate = rows.of(&plant, effect.signal).rate;
-        let numbers = structure.effect_numbers(&model.theta, index);
-        let offset = structure.effect_offset(index);
-        let fixed = !structure.plant_free && index < structure.known.len();
-        let per = match effect.definition.id {
-            "cubic_stiffness" => 3,
-            "quadratic_stiffness" | "quadratic_drag" => 2,
-            "end_stop" | "stiffness_change" | "position_dependent_gain" => 1,
-            _ => 0,
-        };
-        let (value, std, unit) = match effect.direction {
-            Direction::Matched(input) => (
-                numbers[0],
-                covariance
-                    .filter(|_| !fixed)
-                    .map(|c| c[(offset, offset)].max(0.0).sqrt()),
-                self.inputs()[input].unit.clone().unwrap_or_default(),
-            ),
-            Direction::Free => {
-                // Along the strongest input's effect on the rate.
-                let gain = |input: usize| dot(&rate, &plant.b_column(input));
-                let input = (0..self.data().signals())
-                    .max_by(|a, b| gain(*a).abs().total_cmp(&gain(*b).abs()))
-                    .unwrap_or(0);
-                let scale = gain(input);
-                if scale.abs() < 1e-300 {
-                    return;
-                }
-                let n = structure.states();
-                let value = dot(&rate, &numbers[..n]) / scale;
-                let std = covariance.filter(|_| !fixed).map(|c| {
-                    let block = c.view((offset, offset), (n, n));
-                    let r = nalgebra::DVector::from_column_slice(&rate);
-                    ((r.transpose() * block * &r)[(0, 0)].max(0.0)).sqrt() / scale.abs()
-                });
-                (
-                    value * scale.signum(),
-                    std,
-                    self.inputs()[input].unit.clone().unwrap_or_default(),
-                )
-            }
-        };
-        let (_, output) = self.channels_of(effect);
-        let of = output.unit.clone().unwrap_or_default();
-        let rate_unit = if matches!(effect.signal, Signal::Integral(_)) {
-            of.clone()
-        } else {
-            format!("{of}/s")
-        };
-        let unit = match (unit.is_empty() || of.is_empty(), per, effect.definition.id) {
-            (_, 0, _) => unit,
-            (true, ..) => String::new(),
-            (false, 1, _) => format!("{unit}/({of})"),
-            (false, p, "quadratic_drag") => format!("{unit}/({rate_unit})^{p}"),
-            (false, p, _) => format!("{unit}/({of})^{p}"),
-        };
-        let name = match effect.definition.id {
-            "coulomb_friction" | "stribeck_friction" => "friction_force",
-            "quadratic_drag" => "drag",
-            "hysteresis" => "loop_force",
-            "load_step" => "load",
-            "end_stop" => "stop_stiffness",
-            "stiffness_change" => "stiffness_change",
-            "position_dependent_gain" => "gain_per_position",
-            _ => "stiffness",
-        };
-        parameters.insert(name.to_owned(), Quantity { value, std, unit });
     }
 
     fn proof(
@@ -569,88 +356,6 @@ impl Answer<'_> {
         }
     }
 
-    fn alternatives(&self) -> Vec<Alternative> {
-        let named: Vec<&str> = self
-            .finding
-            .model
-            .structure
-            .new_effects()
-            .iter()
-            .map(|e| e.definition.id)
-            .collect();
-        let gain = self.finding.gain;
-        let unexplained = self.finding.verdict == Verdict::Unexplained;
-        self.finding
-            .rivals
-            .iter()
-            .filter(|r| unexplained || !named.contains(&r.definition.id))
-            .take(12)
-            .map(|r| {
-                let why_not = if unexplained {
-                    format!(
-                        "it leaves structure that noise does not make (evidence {})",
-                        words::number(r.gain)
-                    )
-                } else if gain <= 0.0 {
-                    format!(
-                        "evidence {}, and {NEEDED:.0} is needed",
-                        words::number(r.gain)
-                    )
-                } else if gain - r.gain < EFFECTS_TIE {
-                    "it explains this recording equally well".to_owned()
-                } else if r.gain < NEEDED {
-                    format!(
-                        "it explains no more than other parameters do (evidence {})",
-                        words::number(r.gain)
-                    )
-                } else {
-                    format!(
-                        "its evidence is {} against {}: exp({}) times less likely",
-                        words::number(r.gain),
-                        words::number(gain),
-                        words::number(0.5 * (gain - r.gain))
-                    )
-                };
-                Alternative {
-                    effect: r.definition.id.to_owned(),
-                    support: if gain > 0.0 {
-                        (r.gain / gain).clamp(0.0, 1.0)
-                    } else {
-                        0.0
-                    },
-                    criterion_gain: r.gain,
-                    why_not,
-                }
-            })
-            .collect()
-    }
-
-    fn experiment(&self) -> Option<String> {
-        let best = self.finding.rivals.first()?;
-        match self.finding.verdict {
-            Verdict::Family => {
-                let named = self.finding.model.structure.new_effects().first()?.definition;
-                let rival = self.finding.rivals.iter().find(|r| r.definition.id != named.id)?;
-                named
-                    .mimics
-                    .iter()
-                    .find(|m| m.effect == rival.definition.id)
-                    .or_else(|| rival.definition.mimics.iter().find(|m| m.effect == named.id))
-                    .map(|m| m.experiment.to_owned())
-                    .or_else(|| {
-                        Some(format!(
-                            "repeat the recording at half and at twice the amplitude: {} and {} scale differently",
-                            named.name, rival.definition.name
-                        ))
-                    })
-            }
-            Verdict::Unexplained => best.definition.mimics.first().map(|m| m.experiment.to_owned()).or_else(|| {
-                Some("repeat the recording at half and at twice the amplitude, and once with a slow ramp over the whole range".to_owned())
-            }),
-            _ => None,
-        }
-    }
-
     fn remaining(&self, problem: &Problem, model: &Fit) -> Remaining {
         let adequacy = self
             .finding
@@ -705,134 +410,6 @@ impl Answer<'_> {
             .collect()
     }
 
-    /// How large effects must have been: from the error of what a few of them would have added.
-    fn detectable(&self, verdict: Verdict) -> Vec<Detectable> {
-        if !matches!(verdict, Verdict::Consistent | Verdict::Parameters) {
-            return Vec::new();
-        }
-        let mut list: Vec<Detectable> = self
-            .finding
-            .detectable
-            .iter()
-            .map(|(definition, instance, share)| Detectable {
-                effect: definition.id.to_owned(),
-                signal: self.signal_name(instance),
-                share_of_output: *share,
-            })
-            .collect();
-        list.sort_by(|a, b| a.share_of_output.total_cmp(&b.share_of_output));
-        list
-    }
-
-    fn parameter_changes(&self, boring: &Fit) -> Vec<ParameterChange> {
-        let fit = if self.finding.model.structure.plant_free {
-            &self.finding.model
-        } else {
-            boring
-        };
-        if !fit.structure.plant_free {
-            return self.adjustments(fit);
-        }
-        let system = |plant: &super::plant::Plant| {
-            StateSpace::deterministic(
-                plant.a_matrix(),
-                plant.b_matrix(),
-                plant.c_matrix(),
-                plant.d_matrix(),
-                plant.sample_time,
-            )
-            .ok()
-        };
-        let (Some(before), Some(after)) = (
-            system(&fit.structure.coordinates.given),
-            system(&fit.structure.plant(&fit.theta)),
-        ) else {
-            return Vec::new();
-        };
-        let mut changes = Vec::new();
-        if let (Ok(mut a), Ok(mut b)) = (before.poles(), after.poles()) {
-            let key = |p: &crate::model::Pole| (p.natural_frequency, p.value.im);
-            a.retain(|p| p.value.im >= 0.0);
-            b.retain(|p| p.value.im >= 0.0);
-            a.sort_by(|x, y| key(x).0.total_cmp(&key(y).0));
-            b.sort_by(|x, y| key(x).0.total_cmp(&key(y).0));
-            if a.len() == b.len() {
-                for (i, (x, y)) in a.iter().zip(&b).enumerate() {
-                    changes.push(ParameterChange {
-                        name: format!("natural frequency {}", i + 1),
-                        simulation: x.natural_frequency / std::f64::consts::TAU,
-                        recording: y.natural_frequency / std::f64::consts::TAU,
-                        unit: "Hz".to_owned(),
-                    });
-                    if let (Some(simulation), Some(recording), true) =
-                        (x.damping, y.damping, x.value.im > 0.0 && y.value.im > 0.0)
-                    {
-                        changes.push(ParameterChange {
-                            name: format!("damping ratio {}", i + 1),
-                            simulation,
-                            recording,
-                            unit: String::new(),
-                        });
-                    }
-                }
-            }
-        }
-        if let (Some(a), Some(b)) = (before.static_gain(), after.static_gain()) {
-            for o in 0..self.outputs().len() {
-                for j in 0..self.data().signals() {
-                    if a[(o, j)].abs() > 1e-9 {
-                        changes.push(ParameterChange {
-                            name: format!(
-                                "static gain {}/{}",
-                                self.outputs()[o].name,
-                                self.inputs()[j].name
-                            ),
-                            simulation: a[(o, j)],
-                            recording: b[(o, j)],
-                            unit: String::new(),
-                        });
-                    }
-                }
-            }
-        }
-        changes.retain(|c| c.simulation.is_finite() && c.recording.is_finite());
-        changes
-    }
-
-    /// Single numbers that were adjusted beside the plant as given.
-    fn adjustments(&self, fit: &Fit) -> Vec<ParameterChange> {
-        let structure = &fit.structure;
-        (structure.known.len()..structure.first_new())
-            .map(|index| {
-                let effect = &structure.effects[index];
-                let number = structure.effect_numbers(&fit.theta, index)[0];
-                let (input, output) = self.channels_of(effect);
-                let unit = |of: &str| match (&input.unit, &output.unit) {
-                    (Some(i), Some(o)) => format!("{i}/({o}{of})"),
-                    _ => String::new(),
-                };
-                match effect.definition.id {
-                    "input_gain" => ParameterChange {
-                        name: format!("gain of {}, relative", input.name),
-                        simulation: 1.0,
-                        recording: 1.0 + number,
-                        unit: String::new(),
-                    },
-                    id => ParameterChange {
-                        name: format!(
-                            "additional {} at {}",
-                            id.trim_start_matches("linear_"),
-                            output.name
-                        ),
-                        simulation: 0.0,
-                        recording: number,
-                        unit: unit(if id == "linear_damping" { "/s" } else { "" }),
-                    },
-                }
-            })
-            .collect()
-    }
-
     fn signals(&self, boring: &Fit, model: &Fit) -> Vec<SignalTraces> {
         let data = self.data();
         let l = data.outputs;
@@ -880,14 +457,5 @@ impl Answer<'_> {
             }
         }
         traces
-    }
-}
-
-fn port_name(port: Port) -> &'static str {
-    match port {
-        Port::Input => "input",
-        Port::Force => "force",
-        Port::Sensor | Port::Exact => "sensor",
-        Port::Path => "path",
     }
 }

@@ -15,11 +15,13 @@
 //! | `coordinates`, `plant`, `structure`, `run` | the augmented model: numbers, effects, the recursion |
 //! | `effects` | the library, one file a family |
 //! | `noise`, `fit` | coloured, heavy-tailed noise; Levenberg and Marquardt |
-//! | `screen`, `search`, `inquiry` | which effects deserve a fit, the fits, the decision |
+//! | `screen`, `templates`, `features` | one Gauss-Newton step for everything |
+//! | `search`, `refine`, `plausible`, `second`, `inquiry` | the fits, what is kept of them, the decision |
 //! | `exact`, `adequacy` | tests without fits, and of what is left |
 //! | `locate`, `curve`, `prove`, `probability` | where, the law without a form, held-out blocks, how sure |
-//! | `answer`, `words`, `explanation`, `augmented` | what is said, and the model that can be run |
+//! | `answer`, `account`, `words`, `explanation`, `augmented` | what is said, and the model that can be run |
 
+mod account;
 mod adequacy;
 mod answer;
 mod augmented;
@@ -31,19 +33,24 @@ pub mod effects;
 mod error;
 mod exact;
 mod explanation;
+mod features;
 mod fit;
 mod inquiry;
 mod locate;
 mod noise;
 mod plant;
+mod plausible;
 mod probability;
 mod prove;
 mod rebaseline;
+mod refine;
 mod run;
 mod screen;
 mod search;
+mod second;
 mod simulation;
 mod structure;
+mod templates;
 mod words;
 
 pub use answer::{Options, explain};

@@ -8,20 +8,14 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::data::{Data, Series};
-use super::effects::{self, Action, Clock, Definition, Motion, Needs, Observed, Sense};
+use super::effects::{self, Action, Clock, Definition, Sense};
 use super::fit::{Fit, Problem};
 use super::noise::Noise;
 use super::plant::Plant;
 use super::run::run;
-use super::structure::{
-    Direction, Functionals, Instance, Signal, Structure, add_mode, dot, matched_sign,
-};
+use super::structure::{Direction, Functionals, Instance, Signal, Structure, dot, matched_sign};
 use crate::linalg::multiply_tn;
 
-/// Times of change that are tried over a recording.
-const CHANGE_TIMES: usize = 40;
-/// Frequencies at which a missing resonance is tried.
-const MODE_FREQUENCIES: usize = 40;
 /// Lines of the residual's spectrum that are tried as a disturbance.
 const LINES: usize = 4;
 
@@ -37,25 +31,25 @@ pub(crate) struct Lead {
 
 /// Everything that screening around one fit needs.
 pub(crate) struct Bench<'a> {
-    problem: &'a Problem<'a>,
-    basis: &'a Fit,
-    plant: Plant,
-    noise: &'a Noise,
+    pub problem: &'a Problem<'a>,
+    pub basis: &'a Fit,
+    pub plant: Plant,
+    pub noise: &'a Noise,
     /// Square roots of the weights of the values that count.
-    weights: Vec<f64>,
+    pub weights: Vec<f64>,
     /// Whitened weighted residual, projected off the free numbers.
-    residual: DVector<f64>,
+    pub residual: DVector<f64>,
     /// Whitened weighted sensitivities, and the inverse of their Gram matrix.
-    nuisance: DMatrix<f64>,
-    nuisance_inverse: DMatrix<f64>,
-    left: f64,
+    pub nuisance: DMatrix<f64>,
+    pub nuisance_inverse: DMatrix<f64>,
+    pub left: f64,
 }
 
 /// A place and law with its response: one column a linear coefficient.
-struct Template {
-    instance: Instance,
-    shape: Vec<f64>,
-    columns: Vec<Series>,
+pub(crate) struct Template {
+    pub instance: Instance,
+    pub shape: Vec<f64>,
+    pub columns: Vec<Series>,
 }
 
 /// Signals of the basis: per segment.
@@ -162,12 +156,12 @@ impl<'a> Bench<'a> {
         (bench.left > 0.0).then_some(bench)
     }
 
-    fn data(&self) -> &Data {
+    pub fn data(&self) -> &Data {
         self.problem.data
     }
 
     /// Whitened, weighted, without the values that do not count.
-    fn flatten(&self, series: &Series) -> Vec<f64> {
+    pub fn flatten(&self, series: &Series) -> Vec<f64> {
         let mut flat = Vec::with_capacity(self.weights.len());
         for (column, mask) in self.noise.whiten(series).iter().zip(&self.problem.mask) {
             flat.extend(
@@ -184,7 +178,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Columns less what the free numbers of the plant explain of them.
-    fn projected(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+    pub fn projected(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         if self.nuisance.ncols() == 0 {
             return columns.clone();
         }
@@ -193,7 +187,7 @@ impl<'a> Bench<'a> {
         columns - crate::linalg::multiply(&self.nuisance, &coefficients)
     }
 
-    fn clock(&self, segment: usize) -> Clock {
+    pub fn clock(&self, segment: usize) -> Clock {
         Clock {
             start: self.data().segments[segment].start_time,
             step: self.data().sample_time,
@@ -293,533 +287,6 @@ impl<'a> Bench<'a> {
             power[from..=to].fill(0.0);
         }
         peaks
-    }
-
-    fn templates(
-        &self,
-        definition: &'static Definition,
-        signals: &[Signals],
-        lines: &[f64],
-    ) -> Vec<Template> {
-        match definition.action {
-            Action::Input(_) => (0..self.data().signals())
-                .filter(|j| self.basis.structure.coordinates.active_inputs.contains(j))
-                .flat_map(|j| self.input_templates(definition, j))
-                .collect(),
-            Action::Sensor(_) => (0..self.data().outputs)
-                .flat_map(|o| self.sensor_templates(definition, o, lines))
-                .collect(),
-            Action::Force(_, needs, _) => self.force_templates(definition, needs, signals),
-            Action::Mode => (0..self.data().signals())
-                .filter(|j| self.basis.structure.coordinates.active_inputs.contains(j))
-                .flat_map(|j| self.mode_templates(definition, j))
-                .collect(),
-            Action::MissingPath => (0..self.data().signals())
-                .filter(|j| !self.basis.structure.coordinates.active_inputs.contains(j))
-                .map(|j| Template {
-                    instance: Instance {
-                        definition,
-                        channel: j,
-                        signal: Signal::Output(0),
-                        direction: Direction::Free,
-                    },
-                    shape: Vec::new(),
-                    columns: self.directions(
-                        &self
-                            .data()
-                            .segments
-                            .iter()
-                            .map(|s| s.inputs[j].clone())
-                            .collect::<Vec<_>>(),
-                    ),
-                })
-                .collect(),
-            Action::Exact => Vec::new(),
-        }
-    }
-
-    fn observed(&self, channel: Vec<f64>, rate: Vec<f64>, lines: &[f64]) -> Observed {
-        let step = self.data().sample_time;
-        let first = &self.data().segments[0];
-        let length = first.samples() as f64 * step;
-        let change_times = (1..CHANGE_TIMES)
-            .map(|i| first.start_time + length * i as f64 / CHANGE_TIMES as f64)
-            .collect();
-        // From a few periods in the recording to most of the band.
-        let (low, high) = (5.0 / length, 0.45 / step);
-        let frequencies = (0..MODE_FREQUENCIES)
-            .map(|i| low * (high / low).powf(i as f64 / (MODE_FREQUENCIES - 1) as f64))
-            .collect();
-        Observed {
-            channel,
-            rate,
-            step,
-            change_times,
-            lines: lines.to_vec(),
-            frequencies,
-        }
-    }
-
-    /// Response of the outputs to `drive` (a column a segment) entering through `direction`.
-    fn response(&self, direction: &[f64], drive: &[Vec<f64>]) -> Series {
-        let plant = Plant {
-            inputs: 1,
-            b: direction.to_vec(),
-            d: vec![0.0; self.plant.outputs],
-            ..self.plant.clone()
-        };
-        let zero = vec![0.0; plant.states];
-        let mut series = Vec::new();
-        for (index, w) in drive.iter().enumerate() {
-            let input = vec![w.clone()];
-            let y = run(&plant, &[], &zero, &input, w.len(), &self.clock(index))
-                .unwrap_or_else(|| vec![vec![0.0; w.len()]; plant.outputs]);
-            series.extend(y);
-        }
-        series
-    }
-
-    /// Responses to `drive` through each state.
-    fn directions(&self, drive: &[Vec<f64>]) -> Vec<Series> {
-        let n = self.plant.states;
-        (0..n)
-            .map(|i| {
-                let mut unit = vec![0.0; n];
-                unit[i] = 1.0;
-                self.response(&unit, drive)
-            })
-            .collect()
-    }
-
-    fn input_templates(&self, definition: &'static Definition, input: usize) -> Vec<Template> {
-        let Action::Input(law) = definition.action else {
-            return Vec::new();
-        };
-        let segments = &self.data().segments;
-        let channel = segments
-            .iter()
-            .flat_map(|s| s.inputs[input].clone())
-            .collect();
-        let observed = self.observed(channel, Vec::new(), &[]);
-        let b = self.plant.b_column(input);
-        let moment = super::coordinates::Derivatives::new(&self.plant)
-            .moment
-            .swap_remove(input);
-        (definition.starts)(&observed)
-            .into_iter()
-            .map(|shape| {
-                let mut drive = Vec::new();
-                let mut drive_moment = Vec::new();
-                for (index, s) in segments.iter().enumerate() {
-                    let mut u = s.inputs[input].clone();
-                    let mut m = vec![0.0; u.len()];
-                    law(&shape, &mut u, &mut m, &self.clock(index));
-                    drive.push(u.iter().zip(&s.inputs[input]).map(|(a, b)| a - b).collect());
-                    drive_moment.push(m);
-                }
-                let mut column = self.response(&b, &drive);
-                if drive_moment.iter().flatten().any(|v| *v != 0.0) {
-                    let within = self.response(&moment, &drive_moment);
-                    for (y, w) in column.iter_mut().flatten().zip(within.iter().flatten()) {
-                        *y += w;
-                    }
-                }
-                Template {
-                    instance: Instance {
-                        definition,
-                        channel: input,
-                        signal: Signal::Output(0),
-                        direction: Direction::Matched(input),
-                    },
-                    shape,
-                    columns: vec![column],
-                }
-            })
-            .collect()
-    }
-
-    fn sensor_templates(
-        &self,
-        definition: &'static Definition,
-        output: usize,
-        lines: &[f64],
-    ) -> Vec<Template> {
-        let Action::Sensor(law) = definition.action else {
-            return Vec::new();
-        };
-        let l = self.data().outputs;
-        let simulated = &self.basis.simulated;
-        let channel = simulated
-            .iter()
-            .skip(output)
-            .step_by(l)
-            .flatten()
-            .copied()
-            .collect();
-        let observed = self.observed(channel, Vec::new(), lines);
-        let change = |shape: &[f64], scale: f64| -> Series {
-            simulated
-                .iter()
-                .enumerate()
-                .map(|(s, y)| {
-                    if s % l != output {
-                        return vec![0.0; y.len()];
-                    }
-                    let mut seen = y.clone();
-                    law(shape, &mut seen, &self.clock(s / l));
-                    seen.iter().zip(y).map(|(a, b)| (a - b) / scale).collect()
-                })
-                .collect()
-        };
-        let size = self.problem.scale[output];
-        (definition.starts)(&observed)
-            .into_iter()
-            .map(|shape| {
-                let columns = if definition.linear.is_empty() {
-                    vec![change(&shape, 1.0)]
-                } else {
-                    definition
-                        .linear
-                        .iter()
-                        .map(|&i| {
-                            let mut alone = shape.clone();
-                            for &j in definition.linear {
-                                alone[j] = 0.0;
-                            }
-                            alone[i] = size;
-                            change(&alone, size)
-                        })
-                        .collect()
-                };
-                Template {
-                    instance: Instance {
-                        definition,
-                        channel: output,
-                        signal: Signal::Output(output),
-                        direction: Direction::Free,
-                    },
-                    shape,
-                    columns,
-                }
-            })
-            .collect()
-    }
-
-    fn force_templates(
-        &self,
-        definition: &'static Definition,
-        needs: Needs,
-        signals: &[Signals],
-    ) -> Vec<Template> {
-        let Action::Force(law, ..) = definition.action else {
-            return Vec::new();
-        };
-        let rows = Functionals::new(&self.plant);
-        let speed: Vec<bool> = (0..self.plant.outputs)
-            .map(|o| rows.integrates(&self.plant, o))
-            .collect();
-        let aperiodic = crate::linalg::eigenvalues(&self.plant.a_matrix())
-            .is_ok_and(|poles| poles.iter().all(|p| p.im == 0.0));
-        let mut templates = Vec::new();
-        for signal in signals {
-            // An output without static gain is a speed: positions are its integral. One of a plant that cannot
-            // oscillate (a drive) may be a speed as well as a position, so friction is tried on both.
-            let possible = match (needs, signal.instance_signal) {
-                (Needs::Time, Signal::Output(0)) => true,
-                (Needs::Time, _) => false,
-                (Needs::Position | Needs::Rate, Signal::Output(o)) => !speed[o],
-                (Needs::Position, Signal::Integral(o)) => speed[o],
-                (Needs::Rate, Signal::Integral(o)) => {
-                    speed[o] || aperiodic && definition.id != "quadratic_drag"
-                }
-                (_, Signal::Difference(i, j)) => !speed[i] && !speed[j],
-            };
-            if !possible {
-                continue;
-            }
-            let observed = self.observed(signal.position.concat(), signal.rate.concat(), &[]);
-            for shape in (definition.starts)(&observed) {
-                let drive: Vec<Vec<f64>> = (0..self.data().segments.len())
-                    .map(|s| self.force(law, &shape, signal, s))
-                    .collect();
-                templates.push(Template {
-                    instance: Instance {
-                        definition,
-                        channel: 0,
-                        signal: signal.instance_signal,
-                        direction: Direction::Free,
-                    },
-                    shape,
-                    columns: self.directions(&drive),
-                });
-            }
-        }
-        templates
-    }
-
-    /// The law evaluated along the motion of the basis.
-    fn force(
-        &self,
-        law: effects::ForceLaw,
-        shape: &[f64],
-        signal: &Signals,
-        segment: usize,
-    ) -> Vec<f64> {
-        let (x, v) = (&signal.position[segment], &signal.rate[segment]);
-        let clock = self.clock(segment);
-        let mut memory = [0.0; 3];
-        let inputs = &self.data().segments[segment].inputs;
-        (0..x.len())
-            .map(|k| {
-                let next = (k + 1).min(x.len() - 1);
-                let motion = Motion {
-                    position: x[k],
-                    position_free: x[next],
-                    position_gain: 0.0,
-                    rate: v[k],
-                    rate_free: v[next],
-                    rate_gain: 0.0,
-                    input: inputs.first().map_or(0.0, |u| u[k]),
-                    sample: k,
-                    clock,
-                };
-                law(shape, &motion, &mut memory)
-            })
-            .collect()
-    }
-
-    fn mode_templates(&self, definition: &'static Definition, input: usize) -> Vec<Template> {
-        let observed = self.observed(Vec::new(), Vec::new(), &[]);
-        let l = self.data().outputs;
-        (definition.starts)(&observed)
-            .into_iter()
-            .map(|shape| {
-                let mut columns: Vec<Series> = (0..2 * l)
-                    .map(|_| {
-                        self.basis
-                            .simulated
-                            .iter()
-                            .map(|y| vec![0.0; y.len()])
-                            .collect()
-                    })
-                    .collect();
-                for (index, segment) in self.data().segments.iter().enumerate() {
-                    for part in 0..2 {
-                        let mut y = vec![vec![0.0; segment.samples()]];
-                        let residues = if part == 0 { [1.0, 0.0] } else { [0.0, 1.0] };
-                        add_mode(
-                            &shape,
-                            &residues,
-                            &segment.inputs[input],
-                            &self.clock(index),
-                            &mut y,
-                        );
-                        for o in 0..l {
-                            columns[2 * o + part][index * l + o] = y[0].clone();
-                        }
-                    }
-                }
-                Template {
-                    instance: Instance {
-                        definition,
-                        channel: input,
-                        signal: Signal::Output(0),
-                        direction: Direction::Free,
-                    },
-                    shape,
-                    columns,
-                }
-            })
-            .collect()
-    }
-
-    /// What a flexible set of features gains: `(gain, what there was, number of features)`.
-    pub fn feature_gain(&self) -> Option<(f64, f64, usize)> {
-        let signals = self.signals();
-        let rows = Functionals::new(&self.plant);
-        let mut columns: Vec<Vec<f64>> = Vec::new();
-        let data = self.data();
-        let per_segment = |f: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
-            data.segments
-                .iter()
-                .enumerate()
-                .map(|(s, segment)| (0..segment.samples()).map(|k| f(s, k)).collect())
-                .collect()
-        };
-        for &input in self
-            .basis
-            .structure
-            .coordinates
-            .active_inputs
-            .iter()
-            .filter(|j| **j < self.problem.data.signals())
-        {
-            let b = self.plant.b_column(input);
-            let mut drives: Vec<Vec<Vec<f64>>> = Vec::new();
-            let u = |s: usize, k: usize| data.segments[s].inputs[input][k];
-            let channel: Vec<f64> = data
-                .segments
-                .iter()
-                .flat_map(|s| s.inputs[input].clone())
-                .collect();
-            for (low, centre, high) in hats(&channel, 8) {
-                drives.push(per_segment(&|s, k| hat(u(s, k), low, centre, high)));
-            }
-            for delay in [1usize, 2, 4] {
-                drives.push(per_segment(&|s, k| u(s, k.saturating_sub(delay)) - u(s, k)));
-            }
-            for signal in &signals {
-                let place = signal.instance_signal;
-                let speed = |o: usize| rows.integrates(&self.plant, o);
-                let sensible = match place {
-                    Signal::Output(o) => !speed(o),
-                    Signal::Integral(o) => speed(o),
-                    Signal::Difference(i, j) => !speed(i) && !speed(j),
-                };
-                if !sensible {
-                    continue;
-                }
-                let position: Vec<f64> = signal.position.concat();
-                let rate: Vec<f64> = signal.rate.concat();
-                for (low, centre, high) in hats(&position, 8) {
-                    drives.push(per_segment(&|s, k| {
-                        hat(signal.position[s][k], low, centre, high)
-                    }));
-                }
-                for (low, centre, high) in hats(&rate, 8) {
-                    drives.push(per_segment(&|s, k| {
-                        hat(signal.rate[s][k], low, centre, high)
-                    }));
-                }
-                drives.push(per_segment(&|s, k| signal.position[s][k] * u(s, k)));
-                drives.push(per_segment(&|s, k| {
-                    signal.position[s][k] * signal.rate[s][k]
-                }));
-                let size = effects::level(&position, 0.8, f64::abs);
-                for share in [0.03, 0.2] {
-                    drives.push(
-                        signal
-                            .position
-                            .iter()
-                            .map(|x| {
-                                let mut held = x.first().copied().unwrap_or(0.0);
-                                x.iter()
-                                    .map(|x| {
-                                        held = f64::clamp(held, x - share * size, x + share * size);
-                                        held
-                                    })
-                                    .collect()
-                            })
-                            .collect(),
-                    );
-                }
-            }
-            for block in 0..8usize {
-                let inside = |s: usize, k: usize| {
-                    usize::from(k * 8 / data.segments[s].samples().max(1) == block) as f64
-                };
-                drives.push(per_segment(&inside));
-                drives.push(per_segment(&|s, k| inside(s, k) * u(s, k)));
-            }
-            columns.extend(
-                drives
-                    .iter()
-                    .map(|drive| self.flatten(&self.response(&b, drive))),
-            );
-        }
-        let count = columns.len();
-        let rows = self.weights.len();
-        if count == 0 || rows < 4 * count {
-            return None;
-        }
-        let mut before = Vec::with_capacity(count);
-        for column in &columns {
-            before.push(column.iter().map(|v| v * v).sum::<f64>().max(1e-300));
-        }
-        let columns = self.projected(&DMatrix::from_vec(rows, count, columns.concat()));
-        let gram = multiply_tn(&columns, &columns);
-        let inner = columns.tr_mul(&self.residual);
-        // Features that the nuisance or one another explain are no features: keep the directions that stand out.
-        let scaled = DMatrix::from_fn(count, count, |i, j| {
-            gram[(i, j)] / (before[i] * before[j]).sqrt()
-        });
-        let right = DVector::from_iterator(count, (0..count).map(|i| inner[i] / before[i].sqrt()));
-        let eigen = crate::linalg::symmetric_eigen(&scaled).ok()?;
-        let mut gained = 0.0;
-        let mut kept = 0;
-        let largest = eigen.values.iter().copied().fold(0.0, f64::max);
-        for (i, value) in eigen.values.iter().enumerate() {
-            if *value > 1e-6 * largest {
-                gained += eigen.vectors.column(i).dot(&right).powi(2) / value;
-                kept += 1;
-            }
-        }
-        Some((gained, self.left, kept))
-    }
-
-    /// A static law of `values` through input `drive`: hats at `knots`, `(gain, coefficients, covariance)`.
-    pub fn static_law(
-        &self,
-        drive: usize,
-        values: &[Vec<f64>],
-        knots: &[f64],
-    ) -> Option<(f64, DVector<f64>, DMatrix<f64>)> {
-        let b = self.plant.b_column(drive);
-        let m = knots.len();
-        let columns: Vec<Vec<f64>> = (0..m)
-            .map(|i| {
-                let low = if i == 0 {
-                    f64::NEG_INFINITY
-                } else {
-                    knots[i - 1]
-                };
-                let high = if i + 1 == m {
-                    f64::INFINITY
-                } else {
-                    knots[i + 1]
-                };
-                let force: Vec<Vec<f64>> = values
-                    .iter()
-                    .map(|v| {
-                        v.iter()
-                            .map(|v| {
-                                if (i == 0 && *v <= knots[0]) || (i + 1 == m && *v >= knots[m - 1])
-                                {
-                                    1.0
-                                } else {
-                                    hat(
-                                        *v,
-                                        low.max(knots[0] - 1.0),
-                                        knots[i],
-                                        high.min(knots[m - 1] + 1.0),
-                                    )
-                                }
-                            })
-                            .collect()
-                    })
-                    .collect();
-                self.flatten(&self.response(&b, &force))
-            })
-            .collect();
-        let rows = self.weights.len();
-        let raw = DMatrix::from_vec(rows, m, columns.concat());
-        let scale = raw
-            .column_iter()
-            .map(|c| c.norm_squared())
-            .fold(0.0, f64::max);
-        let columns = self.projected(&raw);
-        let mut gram = multiply_tn(&columns, &columns);
-        // A ridge far below what the data determine: the straight line belongs to the plant.
-        for i in 0..m {
-            gram[(i, i)] += 1e-7 * scale;
-        }
-        let inner = columns.tr_mul(&self.residual);
-        let inverse = gram.cholesky()?.inverse();
-        let coefficients = &inverse * &inner;
-        let gain = coefficients.dot(&inner);
-        let variance = (self.left - gain).max(0.0) / (rows as f64 - m as f64).max(1.0);
-        gain.is_finite()
-            .then(|| (gain, coefficients, inverse * variance))
     }
 
     /// What a template gains, with starting values; a force also matched with each input.
@@ -932,25 +399,6 @@ impl<'a> Bench<'a> {
             start,
             gain,
         })
-    }
-}
-
-/// Hats over the quantiles of `values`: `(left foot, top, right foot)`.
-fn hats(values: &[f64], count: usize) -> Vec<(f64, f64, f64)> {
-    let mut knots: Vec<f64> = (0..=count + 1)
-        .map(|i| effects::level(values, i as f64 / (count + 1) as f64, |v| v))
-        .collect();
-    knots.dedup();
-    knots.windows(3).map(|w| (w[0], w[1], w[2])).collect()
-}
-
-fn hat(v: f64, low: f64, centre: f64, high: f64) -> f64 {
-    if v <= low || v >= high {
-        0.0
-    } else if v <= centre {
-        (v - low) / (centre - low)
-    } else {
-        (high - v) / (high - centre)
     }
 }
 

@@ -1,0 +1,165 @@
+//! What comes after the best single effect: confirmation on held-out blocks, a second effect, a feedthrough.
+
+use super::data::Series;
+use super::effects::Definition;
+use super::fit::{Effort, Fit, Problem};
+use super::plausible::sane;
+use super::search::{Ranked, second_effects};
+
+/// A second effect must bring this share of what the first brought: misfit of the first breeds false seconds
+/// (math/explain.md, choice 9).
+const SECOND_SHARE: f64 = 0.1;
+
+/// ... and at least this much.
+const SECOND_GAIN: f64 = 30.0;
+
+/// A second effect beside one of the two best singles, where the best single leaves something.
+pub(crate) fn pair(
+    problem: &Problem,
+    ranked: &[Ranked],
+    base: f64,
+    allowed: &(dyn Fn(&Definition) -> bool + Sync),
+) -> Option<Fit> {
+    let count = problem.count();
+    let mut ranked = ranked.to_vec();
+    ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let best = ranked.first()?;
+    let id = |r: &Ranked| r.fit.structure.new_effects()[0].definition.id;
+    // The two best effects, each with the plant free and as given: a free plant may hide the second effect.
+    let mut firsts: Vec<&Ranked> = Vec::new();
+    // A resonance imitates any linear misfit, so it is no first effect unless it is the best.
+    let second = ranked
+        .iter()
+        .find(|r| id(r) != id(best) && id(r) != "extra_mode");
+    for name in [Some(best), second].into_iter().flatten().map(id) {
+        for free in [true, false] {
+            firsts.extend(
+                ranked
+                    .iter()
+                    .find(|r| id(r) == name && r.fit.structure.plant_free == free),
+            );
+        }
+    }
+    let single_gain = base - best.criterion;
+    let found = second_effects(problem, &firsts, allowed);
+    let found = found
+        .into_iter()
+        .filter(|r| {
+            !look_alikes(
+                r.fit.structure.new_effects()[0].definition.id,
+                r.fit.structure.new_effects()[1].definition.id,
+            )
+        })
+        .filter(|r| sane(problem, &r.fit))
+        .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
+    let gain = best.criterion - found.fit.criterion(count);
+    let enough = gain > SECOND_GAIN.max(SECOND_SHARE * single_gain);
+    // Blocks that were not fitted make up a share of the recording: a real gain shows there in proportion.
+    let seen_again = || {
+        heldout_gain(problem, &best.fit, &found.fit)
+            .is_some_and(|held| held > 0.5 * super::prove::SHARE * gain)
+    };
+    (enough && seen_again()).then_some(found.fit)
+}
+
+/// What a feedthrough must gain to be believed (strong evidence, Kass and Raftery 1995).
+const FEEDTHROUGH_GAIN: f64 = 10.0;
+
+/// Share of an input's innovation variance that fed-back noise makes up at least, where a feedthrough would be misled.
+const FEEDBACK_SHARE: f64 = 0.05;
+
+/// Lags over which feedback would show.
+const FEEDBACK_LAGS: usize = 20;
+
+/// `fit` with the direct feedthrough free, where that gains much and nothing speaks for feedback: under feedback an
+/// input that holds the present noise imitates a feedthrough.
+pub(crate) fn with_feedthrough(problem: &Problem, fit: &Fit) -> Option<Fit> {
+    // A simulation that was given without feedthrough has none; an identified baseline never asked.
+    if !problem.data.constant
+        || !fit.structure.plant_free
+        || fit.structure.feedthrough_free
+        || feedback(problem, fit)
+    {
+        return None;
+    }
+    let mut structure = fit.structure.clone();
+    structure.feedthrough_free = true;
+    let at = fit.structure.linear_len();
+    let given = &structure.coordinates.given;
+    let d: Vec<f64> = structure
+        .coordinates
+        .active_inputs
+        .iter()
+        .flat_map(|&j| (0..given.outputs).map(move |o| (o, j)))
+        .map(|(o, j)| given.d[o * given.inputs + j])
+        .collect();
+    let mut theta = fit.theta.clone();
+    theta.splice(at..at, d);
+    let direct = Fit::run(problem, structure, theta, Some(&fit.noise), Effort::FINAL)?;
+    let count = problem.count();
+    (direct.criterion(count) < fit.criterion(count) - FEEDTHROUGH_GAIN).then_some(direct)
+}
+
+/// Whether the residual foretells the inputs: its whitened values correlate with later innovations of an input.
+fn feedback(problem: &Problem, fit: &Fit) -> bool {
+    let data = problem.data;
+    let e = fit.noise.whiten(&fit.residual);
+    (0..data.signals()).any(|j| {
+        let u: Series = data.segments.iter().map(|s| s.inputs[j].clone()).collect();
+        let mask: Vec<Vec<bool>> = u.iter().map(|c| vec![true; c.len()]).collect();
+        let own = super::noise::Noise::estimate(&u, 1, &mask, super::noise::MOST_ORDER);
+        let w = own.whiten(&u);
+        (0..data.outputs).any(|o| {
+            (1..=FEEDBACK_LAGS).any(|lag| {
+                let (mut sum, mut ee, mut ww, mut n) = (0.0, 0.0, 0.0, 0.0);
+                for (s, w) in w.iter().enumerate() {
+                    let e = &e[s * data.outputs + o];
+                    for k in super::noise::MOST_ORDER..w.len().saturating_sub(lag) {
+                        sum += e[k] * w[k + lag];
+                        ee += e[k] * e[k];
+                        ww += w[k + lag] * w[k + lag];
+                        n += 1.0;
+                    }
+                }
+                // Significant, and as much as a controller makes of it.
+                sum * sum > f64::max(16.0 / f64::max(n, 1.0), FEEDBACK_SHARE) * ee * ww
+            })
+        })
+    })
+}
+
+/// Decrease of the deviance from `a` to `b` on blocks that neither was fitted to.
+pub(crate) fn heldout_gain(problem: &Problem, a: &Fit, b: &Fit) -> Option<f64> {
+    let (train, test) = super::prove::split(problem.data, &problem.mask);
+    let (a, b) = rayon::join(
+        || super::prove::refit(problem, a, &train),
+        || super::prove::refit(problem, b, &train),
+    );
+    let (a, b) = (a?, b?);
+    Some(a.noise.deviance(&a.residual, &test) - b.noise.deviance(&b.residual, &test))
+}
+
+/// Effects of one kind, of which a recording hardly holds two: misfit of the one would be called the other.
+const KINDS: &[&[&str]] = &[
+    &[
+        "coulomb_friction",
+        "stribeck_friction",
+        "hysteresis",
+        "input_backlash",
+    ],
+    &["cubic_stiffness", "quadratic_stiffness", "end_stop"],
+    &["input_delay", "actuator_lag", "input_rate_limit"],
+    &[
+        "sensor_offset",
+        "sensor_drift",
+        "load_step",
+        "periodic_disturbance",
+    ],
+    &["gain_change", "stiffness_change"],
+];
+
+fn look_alikes(a: &str, b: &str) -> bool {
+    KINDS
+        .iter()
+        .any(|kind| kind.contains(&a) && kind.contains(&b))
+}
