@@ -44,6 +44,7 @@
 //! | [`model`] | what a state-space system does: simulate, predict, frequency response, poles, zeros |
 //! | [`covariance`] | the covariance of the parameters, and of what follows from them |
 //! | [`validate`] | fit, and residual tests that stay honest in closed loop and under coloured noise |
+//! | [`explain`](mod@explain) | what a simulation leaves out: located, named, fitted, proved |
 //! | [`report`] | JSON documents with their schema, tables for people |
 //! | [`cli`] | the command line |
 //! | [`linalg`] | the only place that names faer |
