@@ -22,8 +22,6 @@ const MODE_HANDICAP: f64 = 0.01;
 /// What an answer owes that physics allows but that is rare, such as a hysteresis that gives energy back: odds of 1
 /// to 400.
 const UNUSUAL: f64 = 12.0;
-/// With as many values a test of what is left that could not be made counts against the explanation.
-const TESTABLE: usize = 1000;
 /// Evidence from which held-out blocks are not asked: they could not say otherwise.
 const BEYOND_DOUBT: f64 = 100.0;
 /// With a larger probability what is left is called noise, and no second effect is looked for.
@@ -164,7 +162,7 @@ pub(crate) fn inquire(
         finding.gain = gain;
         finding.adequacy = adequacy(&problem, &fit, Some(finding.boring.best(count)));
         finding.augmented = Some(fit.clone());
-        let holds = finding.adequacy.map_or(count < TESTABLE, |a| a.holds());
+        let holds = finding.adequacy.is_none_or(|a| a.holds());
         finding.verdict = if !holds {
             Verdict::Unexplained
         } else if finding.rivals.iter().any(|r| {
@@ -178,7 +176,7 @@ pub(crate) fn inquire(
         finding.model = fit;
     } else {
         finding.adequacy = adequacy(&problem, finding.boring.best(count), None);
-        let holds = finding.adequacy.map_or(count < TESTABLE, |a| a.holds());
+        let holds = finding.adequacy.is_none_or(|a| a.holds());
         finding.verdict = if !holds {
             Verdict::Unexplained
         } else if !finding.freezes.is_empty() || finding.coarse.is_some() {
