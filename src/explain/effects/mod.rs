@@ -2,7 +2,7 @@
 //!
 //! An entry is a [`Definition`]: an equation, where it acts (its [`Port`]), its parameters with units and bounds,
 //! where to start looking for them, what imitates it, and which recording would tell the two apart. A force law is
-//! written for unit amplitude: amplitude and entry point are the direction `b_w` of [`super::candidate`].
+//! written for unit amplitude: amplitude and entry point are the direction `b_w` of `structure`.
 
 mod actuator;
 mod change;
