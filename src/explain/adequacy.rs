@@ -1,6 +1,6 @@
 //! Is what an explanation leaves behind noise?
 //!
-//! Some eighty flexible features (hats in the input, the position and the rate, in time, products, delays, play) are
+//! Some forty flexible features an output (hats in the input, the position and the rate, in time, products, delays, play) are
 //! sent through the plant and regressed on the residual, beyond what the fitted numbers explain. The test is made
 //! under low-order noise: an autoregression of high order learns slow misfit as colour and hides it
 //! (math/explain.md, choice 10). A significant share of little size is no objection: every model is wrong somewhere.
