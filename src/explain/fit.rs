@@ -14,8 +14,8 @@ use crate::linalg::multiply_tn;
 /// A difference step should move the outputs by this share of their standard deviation.
 const STEP_SHARE: f64 = 1e-5;
 /// Steps stay between these, whatever the outputs do.
-const SMALLEST_STEP: f64 = 1e-14;
-const LARGEST_STEP: f64 = 1e6;
+const SMALLEST_STEP: f64 = 1e-30;
+const LARGEST_STEP: f64 = 1e30;
 /// Steps that are made with one set of derivatives before they are taken anew.
 const STEPS_EACH: usize = 2;
 

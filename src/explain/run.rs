@@ -6,8 +6,9 @@ use super::plant::Plant;
 
 /// Most states that can be run.
 pub(crate) const MOST_STATES: usize = 12;
-/// A simulated output beyond this many times the size of a sensible one has diverged.
-const DIVERGED: f64 = 1e8;
+/// A simulation that gets here has diverged. Far beyond what any unit makes of a sensible number, so that the limit
+/// knows no units; squares and products of such numbers still are numbers.
+const DIVERGED: f64 = 1e60;
 
 /// A force made ready for one parameter vector.
 #[derive(Debug, Clone)]
@@ -123,7 +124,7 @@ fn sized<const N: usize>(
                 *next += b * u;
             }
         }
-        if !forces.is_empty() && !next.iter().all(|v| v.abs() < DIVERGED * 1e3) {
+        if !forces.is_empty() && !next.iter().all(|v| v.abs() < DIVERGED) {
             return None;
         }
         for f in &mut forces {
@@ -150,13 +151,13 @@ fn sized<const N: usize>(
             }
         }
         x = next;
-        if k % 64 == 0 && !x.iter().all(|v| v.abs() < DIVERGED * 1e3) {
+        if k % 64 == 0 && !x.iter().all(|v| v.abs() < DIVERGED) {
             return None;
         }
     }
     outputs
         .iter()
         .flatten()
-        .all(|y| y.abs() < DIVERGED * 1e3)
+        .all(|y| y.abs() < DIVERGED)
         .then_some(outputs)
 }
