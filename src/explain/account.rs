@@ -8,8 +8,9 @@ use super::explanation::{
     Alternative, Detectable, EFFECTS_TIE, EffectFound, Evidence, ParameterChange, Quantity, Verdict,
 };
 use super::fit::{Fit, Problem};
+use super::functionals::{Functionals, dot};
 use super::inquiry::NEEDED;
-use super::structure::{Direction, Functionals, Signal, dot};
+use super::structure::{Direction, Signal};
 use super::words;
 use crate::log::Channel;
 use crate::model::StateSpace;
@@ -56,6 +57,12 @@ impl Answer<'_> {
                     },
                 );
             }
+            let mut signal = signal;
+            if let Action::Sine = definition.action {
+                let from = offset + amplitudes + definition.parameters.len();
+                signal =
+                    self.sine_amplitudes(model, index, from, covariance.as_ref(), &mut parameters);
+            }
             let mut effect_found = EffectFound {
                 effect: definition.id.to_owned(),
                 variant: definition.variant.to_owned(),
@@ -92,6 +99,51 @@ impl Answer<'_> {
             found.extend(self.exact("sensor_quantization", output, &[("step", step, &unit)]));
         }
         found
+    }
+
+    /// Amplitudes of a sinusoid at the outputs; the name of the output that shows it most, over its noise.
+    fn sine_amplitudes(
+        &self,
+        model: &Fit,
+        index: usize,
+        from: usize,
+        covariance: Option<&nalgebra::DMatrix<f64>>,
+        parameters: &mut BTreeMap<String, Quantity>,
+    ) -> String {
+        let numbers = model.structure.effect_numbers(&model.theta, index);
+        let parts = &numbers[model.structure.effects[index].definition.parameters.len()..];
+        let mut most = (0.0, 0);
+        for (o, part) in parts.chunks_exact(2).enumerate() {
+            let size = part[0].hypot(part[1]);
+            let std = covariance.map(|c| {
+                // First order: the variance along the phase that was found.
+                let g = [part[0] / size.max(1e-300), part[1] / size.max(1e-300)];
+                let at = from + 2 * o;
+                let variance: f64 = (0..2)
+                    .flat_map(|i| (0..2).map(move |j| (i, j)))
+                    .map(|(i, j)| g[i] * c[(at + i, at + j)] * g[j])
+                    .sum();
+                variance.max(0.0).sqrt()
+            });
+            let name = if parts.len() == 2 {
+                "amplitude".to_owned()
+            } else {
+                format!("amplitude_{}", self.outputs()[o].name)
+            };
+            parameters.insert(
+                name,
+                Quantity {
+                    value: size,
+                    std,
+                    unit: self.outputs()[o].unit.clone().unwrap_or_default(),
+                },
+            );
+            let seen = size / model.noise.scale[o];
+            if seen > most.0 {
+                most = (seen, o);
+            }
+        }
+        self.outputs()[most.1].name.clone()
     }
 
     fn exact(&self, id: &str, output: usize, numbers: &[(&str, f64, &str)]) -> Option<EffectFound> {

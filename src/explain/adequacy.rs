@@ -1,83 +1,158 @@
 //! Is what an explanation leaves behind noise?
 //!
-//! Some forty flexible features an output (hats in the input, the position and the rate, in time, products, delays, play) are
-//! sent through the plant and regressed on the residual, beyond what the fitted numbers explain. The test is made
+//! Some seventy flexible features an output (hats in the input and its rate, in the position and the rate, in time, products,
+//! delays, play, curves at the sensor) are sent through the plant and regressed on the residual, beyond what the
+//! fitted numbers explain: along the motion of the explanation, and along that of the simulation as given, because an
+//! explanation that fails may have lost the motion. A line in the spectrum is looked for as well. The tests are made
 //! under low-order noise: an autoregression of high order learns slow misfit as colour and hides it
 //! (math/explain.md, choice 10). A significant share of little size is no objection: every model is wrong somewhere.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::data::Series;
 use super::fit::{Fit, Problem};
-use super::noise::Noise;
+use super::noise::{Mask, Noise};
 use super::screen::Bench;
 
 /// Significance at which what is left counts as structure.
 pub(crate) const LEVEL: f64 = 1e-4;
-/// Share of the residual's variance from which structure matters.
+/// Share of the residual's variance from which structure matters where no physics is named.
 pub(crate) const SHARE: f64 = 0.03;
 
 /// Structure that is left counts as imperfection of a law that is right in kind, while it is below this share of what
-/// the law has explained: the textbook form of a law is rarely closer to a real one than some percents.
-pub(crate) const OF_REMOVED: f64 = 0.03;
+/// the law has explained: the textbook form of a law is rarely closer to a real one than some thousandths.
+pub(crate) const OF_REMOVED: f64 = 0.01;
+
+/// Motions that differ by more (in standard deviations of the outputs) are both tried.
+const OTHER_MOTION: f64 = 0.1;
 
 /// What a residual still holds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Adequacy {
     pub features: usize,
     pub p_value: f64,
-    /// Share of the whitened residual's variance that the features explain, less what chance explains.
+    /// Share of the whitened residual's variance that is explained, less what chance explains.
     pub share: f64,
-    /// The same, over what the explanation has removed from the error before it.
+    /// The same, over what the explanation has removed from the error before it; infinite without one.
     pub of_removed: f64,
 }
 
 impl Adequacy {
     /// Whether the explanation suffices.
     pub fn holds(&self) -> bool {
-        self.p_value > LEVEL || self.share < SHARE || self.of_removed < OF_REMOVED
+        self.p_value > LEVEL
+            || if self.of_removed.is_finite() {
+                self.of_removed < OF_REMOVED
+            } else {
+                self.share < SHARE
+            }
     }
 }
 
-/// Tests what `fit` leaves; `before` is the best explanation without its effects.
-pub(crate) fn adequacy(problem: &Problem, fit: &Fit, before: Option<&Fit>) -> Option<Adequacy> {
+/// One test: its probability under noise, and the variance that it explains beyond chance.
+struct Structure {
+    p_value: f64,
+    explained: f64,
+}
+
+/// Tests what `fit` leaves; `given` is the simulation as given, `before` the best explanation without the effects of
+/// `fit`, if it has any.
+pub(crate) fn adequacy(
+    problem: &Problem,
+    fit: &Fit,
+    given: &Fit,
+    before: Option<&Fit>,
+) -> Option<Adequacy> {
     let mut fit = fit.clone();
     let noise = Noise::estimate(&fit.residual, problem.data.outputs, &problem.mask, 1);
     let sensitivities = fit.sensitivities(problem);
     let bench = Bench::new(problem, &fit, &noise, sensitivities)?;
-    let (gained, left, features) = bench.feature_gain()?;
-    let n = problem.count() as f64;
-    let variance = (left - gained) / (n - features as f64).max(1.0);
-    let statistic = gained / variance.max(1e-300);
-    let p_value = ChiSquared::new(features as f64).map_or(1.0, |d| d.sf(statistic));
+    let mut tests = Vec::new();
+    let mut features = 0;
+    let moved = problem.size(&given.simulated, &fit.simulated) > OTHER_MOTION;
+    for moving in [Some(&fit), moved.then_some(given)].into_iter().flatten() {
+        let Some((gained, left, count)) = bench.feature_gain(moving) else {
+            continue;
+        };
+        let free = count as f64;
+        let variance = (left - gained) / (problem.count() as f64 - free).max(1.0);
+        tests.push(Structure {
+            p_value: ChiSquared::new(free).map_or(1.0, |d| d.sf(gained / variance.max(1e-300))),
+            explained: (gained - free * variance).max(0.0),
+        });
+        features = features.max(count);
+    }
+    if tests.is_empty() {
+        return None;
+    }
+    let left = bench.left;
+    let whitened = noise.whiten(&fit.residual);
+    tests.push(line(&whitened, &problem.mask));
+    // As many tests, one level: Bonferroni's bound.
+    let count = tests.len() as f64;
+    let p_value = |t: &Structure| (count * t.p_value).min(1.0);
+    let significant = tests
+        .iter()
+        .filter(|t| p_value(t) <= LEVEL)
+        .max_by(|a, b| a.explained.total_cmp(&b.explained));
+    let shown =
+        significant.or_else(|| tests.iter().min_by(|a, b| a.p_value.total_cmp(&b.p_value)))?;
     Some(Adequacy {
         features,
-        p_value,
+        p_value: p_value(shown),
+        share: shown.explained / left,
         of_removed: before.map_or(f64::INFINITY, |before| {
-            // What was there is measured by the same features, so that noise is not counted as removed.
-            let whitened = noise.whiten(&before.residual);
-            let there: f64 = whitened
-                .iter()
-                .zip(&problem.mask)
-                .flat_map(|(e, m)| {
-                    e.iter()
-                        .zip(m)
-                        .filter(|(_, keep)| **keep)
-                        .map(|(e, _)| e * e)
-                })
-                .sum();
-            let now: f64 = noise
-                .whiten(&fit.residual)
-                .iter()
-                .zip(&problem.mask)
-                .flat_map(|(e, m)| {
-                    e.iter()
-                        .zip(m)
-                        .filter(|(_, keep)| **keep)
-                        .map(|(e, _)| e * e)
-                })
-                .sum();
-            (gained - features as f64 * variance).max(0.0) / (there - now).max(1e-300)
+            // What was there is measured in the same metric.
+            let there = square(&noise.whiten(&before.residual), &problem.mask);
+            let now = square(&whitened, &problem.mask);
+            (shown.explained / (there - now).max(1e-12 * left)).min(MOST)
         }),
-        share: ((gained - features as f64 * variance) / left).max(0.0),
     })
+}
+
+/// Cap of a share of next to nothing.
+const MOST: f64 = 1e6;
+
+/// Sum of squares of the values that count.
+fn square(series: &[Vec<f64>], mask: &[Vec<bool>]) -> f64 {
+    series
+        .iter()
+        .zip(mask)
+        .flat_map(|(e, m)| e.iter().zip(m))
+        .filter(|(_, keep)| **keep)
+        .map(|(e, _)| e * e)
+        .sum()
+}
+
+/// The largest line of the periodogram against the sum of all (Fisher 1929): `m` ordinates of white noise hold one
+/// of more than the share `g` with probability `m exp(-m g)` at most, about.
+fn line(whitened: &Series, mask: &Mask) -> Structure {
+    let mut found = Structure {
+        p_value: 1.0,
+        explained: 0.0,
+    };
+    let mut planner = realfft::RealFftPlanner::<f64>::new();
+    for (e, keep) in whitened.iter().zip(mask) {
+        let mut kept: Vec<f64> = e
+            .iter()
+            .zip(keep)
+            .map(|(e, keep)| if *keep { *e } else { 0.0 })
+            .collect();
+        let transform = planner.plan_fft_forward(kept.len());
+        let mut spectrum = transform.make_output_vec();
+        if transform.process(&mut kept, &mut spectrum).is_err() || spectrum.len() < 8 {
+            continue;
+        }
+        let power: Vec<f64> = spectrum.iter().skip(1).map(|s| s.norm_sqr()).collect();
+        let total: f64 = power.iter().sum();
+        let m = power.len() as f64;
+        let share = power.iter().copied().fold(0.0, f64::max) / total.max(1e-300);
+        let p_value = (m.ln() - m * share).exp().min(1.0) * whitened.len() as f64;
+        let explained = (share - m.ln() / m).max(0.0)
+            * square(std::slice::from_ref(e), std::slice::from_ref(keep));
+        if p_value < found.p_value {
+            found = Structure { p_value, explained };
+        }
+    }
+    found
 }

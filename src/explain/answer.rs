@@ -360,12 +360,13 @@ impl Answer<'_> {
         let adequacy = self
             .finding
             .adequacy
-            .or_else(|| adequacy(problem, model, None));
+            .or_else(|| adequacy(problem, model, &self.finding.boring.given, None));
         let Some(a) = adequacy else {
             return Remaining {
                 adequate: true,
                 p_value: 1.0,
                 share: 0.0,
+                share_of_removed: None,
                 features: 0,
                 sentence: "The recording is too short to test what is left".to_owned(),
             };
@@ -390,6 +391,7 @@ impl Answer<'_> {
             adequate: a.holds(),
             p_value: a.p_value,
             share: a.share,
+            share_of_removed: a.of_removed.is_finite().then_some(a.of_removed),
             features: a.features,
             sentence: format!("{sentence}."),
         }

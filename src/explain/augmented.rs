@@ -8,9 +8,10 @@ use super::coordinates::Coordinates;
 use super::data::Segment;
 use super::effects::{self, Action};
 use super::explanation::{AugmentedModel, ModelEffect, SignalReference};
+use super::functionals::Functionals;
 use super::plant::{Plant, row_major};
 use super::simulation::delayed;
-use super::structure::{Direction, Functionals, Instance, Signal, Structure};
+use super::structure::{Direction, Instance, Signal, Structure};
 use crate::log::Channel;
 use crate::report::Rows;
 

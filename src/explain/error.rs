@@ -36,9 +36,17 @@ pub enum ExplainError {
         simulation: String,
         simulated: f64,
     },
-    /// Outputs differ in number or name.
-    #[error("{simulation}: {what}; name the columns with --outputs, or rename them in the file")]
-    Channels { simulation: String, what: String },
+    /// Inputs or outputs differ in number.
+    #[error(
+        "{simulation}: {simulated}, and {recording} has {recorded}; name the columns that belong together with {option}"
+    )]
+    Channels {
+        simulation: String,
+        simulated: String,
+        recording: String,
+        recorded: usize,
+        option: &'static str,
+    },
     /// Units differ.
     #[error(
         "{simulation}: {channel} is in {simulated}, and the recording's is in {recorded}; convert one of them, or take the unit out of its header"

@@ -230,6 +230,9 @@ pub struct Remaining {
     pub p_value: f64,
     /// Share of the residual's variance that flexible features explain.
     pub share: f64,
+    /// The same structure over what the named physics removes from the error; absent without a name.
+    #[serde(default)]
+    pub share_of_removed: Option<f64>,
     /// Flexible features that were tried.
     pub features: usize,
     /// In words.

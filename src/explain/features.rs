@@ -2,25 +2,30 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::data::Series;
 use super::effects;
-use super::screen::Bench;
-use super::structure::{Functionals, Signal};
+use super::fit::Fit;
+use super::functionals::Functionals;
+use super::screen::{Bench, Signals, motions};
 use crate::linalg::multiply_tn;
 
+/// Hats over a value, and over the rate of an input.
+const HATS: usize = 8;
+const RATE_HATS: usize = 6;
+/// Blocks of time.
+const BLOCKS: usize = 8;
+/// Half widths of play, over the size of the signal.
+const PLAYS: [f64; 2] = [0.03, 0.2];
+
 impl Bench<'_> {
-    /// What a flexible set of features gains: `(gain, what there was, number of features)`.
-    pub fn feature_gain(&self) -> Option<(f64, f64, usize)> {
-        let signals = self.signals();
-        let rows = Functionals::new(&self.plant);
+    /// What a flexible set of features gains: `(gain, what there was, number of features)`. The laws are evaluated along
+    /// the motion of `moving`: the basis itself, or the simulation as given where a misfit has taken the motion out of
+    /// the basis.
+    pub fn feature_gain(&self, moving: &Fit) -> Option<(f64, f64, usize)> {
+        let plant = moving.structure.plant(&moving.theta);
+        let signals = motions(self.problem, moving, &plant);
+        let rows = Functionals::new(&plant);
         let mut columns: Vec<Vec<f64>> = Vec::new();
-        let data = self.data();
-        let per_segment = |f: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
-            data.segments
-                .iter()
-                .enumerate()
-                .map(|(s, segment)| (0..segment.samples()).map(|k| f(s, k)).collect())
-                .collect()
-        };
         for &input in self
             .basis
             .structure
@@ -30,71 +35,11 @@ impl Bench<'_> {
             .filter(|j| **j < self.problem.data.signals())
         {
             let b = self.plant.b_column(input);
-            let mut drives: Vec<Vec<Vec<f64>>> = Vec::new();
-            let u = |s: usize, k: usize| data.segments[s].inputs[input][k];
-            let channel: Vec<f64> = data
-                .segments
-                .iter()
-                .flat_map(|s| s.inputs[input].clone())
-                .collect();
-            for (low, centre, high) in hats(&channel, 8) {
-                drives.push(per_segment(&|s, k| hat(u(s, k), low, centre, high)));
-            }
-            for delay in [1usize, 2, 4] {
-                drives.push(per_segment(&|s, k| u(s, k.saturating_sub(delay)) - u(s, k)));
-            }
+            let mut drives = self.input_drives(input);
             for signal in &signals {
-                let place = signal.instance_signal;
-                let speed = |o: usize| rows.integrates(&self.plant, o);
-                let sensible = match place {
-                    Signal::Output(o) => !speed(o),
-                    Signal::Integral(o) => speed(o),
-                    Signal::Difference(i, j) => !speed(i) && !speed(j),
-                };
-                if !sensible {
-                    continue;
+                if rows.sensible(&plant, signal.instance_signal) {
+                    drives.extend(self.motion_drives(input, signal));
                 }
-                let position: Vec<f64> = signal.position.concat();
-                let rate: Vec<f64> = signal.rate.concat();
-                for (low, centre, high) in hats(&position, 8) {
-                    drives.push(per_segment(&|s, k| {
-                        hat(signal.position[s][k], low, centre, high)
-                    }));
-                }
-                for (low, centre, high) in hats(&rate, 8) {
-                    drives.push(per_segment(&|s, k| {
-                        hat(signal.rate[s][k], low, centre, high)
-                    }));
-                }
-                drives.push(per_segment(&|s, k| signal.position[s][k] * u(s, k)));
-                drives.push(per_segment(&|s, k| {
-                    signal.position[s][k] * signal.rate[s][k]
-                }));
-                let size = effects::level(&position, 0.8, f64::abs);
-                for share in [0.03, 0.2] {
-                    drives.push(
-                        signal
-                            .position
-                            .iter()
-                            .map(|x| {
-                                let mut held = x.first().copied().unwrap_or(0.0);
-                                x.iter()
-                                    .map(|x| {
-                                        held = f64::clamp(held, x - share * size, x + share * size);
-                                        held
-                                    })
-                                    .collect()
-                            })
-                            .collect(),
-                    );
-                }
-            }
-            for block in 0..8usize {
-                let inside = |s: usize, k: usize| {
-                    usize::from(k * 8 / data.segments[s].samples().max(1) == block) as f64
-                };
-                drives.push(per_segment(&inside));
-                drives.push(per_segment(&|s, k| inside(s, k) * u(s, k)));
             }
             columns.extend(
                 drives
@@ -102,13 +47,116 @@ impl Bench<'_> {
                     .map(|drive| self.flatten(&self.response(&b, drive))),
             );
         }
+        let l = self.data().outputs;
+        for o in 0..l {
+            let seen: Vec<Vec<f64>> = moving
+                .simulated
+                .iter()
+                .skip(o)
+                .step_by(l)
+                .cloned()
+                .collect();
+            columns.extend(
+                self.sensor_drives(&seen)
+                    .into_iter()
+                    .map(|drive| self.flatten(&self.at_output(o, drive))),
+            );
+        }
+        self.gain_of(&columns)
+    }
+
+    /// What a sensor may have added: curves in what it sees, and trends.
+    fn sensor_drives(&self, seen: &[Vec<f64>]) -> Vec<Vec<Vec<f64>>> {
+        let mut drives = Vec::new();
+        for (low, centre, high) in hats(&seen.concat(), HATS) {
+            drives.push(self.each(&|s, k| hat(seen[s][k], low, centre, high)));
+        }
+        for block in 0..=BLOCKS {
+            drives.push(self.each(&|s, k| {
+                let at = (k * BLOCKS) as f64 / seen[s].len().max(1) as f64;
+                hat(at, block as f64 - 1.0, block as f64, block as f64 + 1.0)
+            }));
+        }
+        drives
+    }
+
+    /// `drive` (a column a segment) added to output `o`.
+    fn at_output(&self, o: usize, drive: Vec<Vec<f64>>) -> Series {
+        let l = self.data().outputs;
+        drive
+            .into_iter()
+            .flat_map(|column| {
+                let silent = vec![0.0; column.len()];
+                let mut outputs = vec![silent; l];
+                outputs[o] = column;
+                outputs
+            })
+            .collect()
+    }
+
+    fn each(&self, f: &dyn Fn(usize, usize) -> f64) -> Vec<Vec<f64>> {
+        self.data()
+            .segments
+            .iter()
+            .enumerate()
+            .map(|(s, segment)| (0..segment.samples()).map(|k| f(s, k)).collect())
+            .collect()
+    }
+
+    /// Drives that an input may have been changed by: curves in its value and its rate, delays, play, time.
+    fn input_drives(&self, input: usize) -> Vec<Vec<Vec<f64>>> {
+        let data = self.data();
+        let u = |s: usize, k: usize| data.segments[s].inputs[input][k];
+        let change = |s: usize, k: usize| u(s, k) - u(s, k.saturating_sub(1));
+        let mut drives = Vec::new();
+        let values = self.each(&u);
+        for (low, centre, high) in hats(&values.concat(), HATS) {
+            drives.push(self.each(&|s, k| hat(u(s, k), low, centre, high)));
+        }
+        for (low, centre, high) in hats(&self.each(&change).concat(), RATE_HATS) {
+            drives.push(self.each(&|s, k| hat(change(s, k), low, centre, high)));
+        }
+        for delay in [1usize, 2, 4] {
+            drives.push(self.each(&|s, k| u(s, k.saturating_sub(delay)) - u(s, k)));
+        }
+        drives.extend(plays(&values));
+        for block in 0..BLOCKS {
+            let inside = |s: usize, k: usize| {
+                f64::from(u8::from(
+                    k * BLOCKS / data.segments[s].samples().max(1) == block,
+                ))
+            };
+            drives.push(self.each(&inside));
+            drives.push(self.each(&|s, k| inside(s, k) * u(s, k)));
+        }
+        drives
+    }
+
+    /// Forces that a motion may have caused: curves in position and rate, products, play.
+    fn motion_drives(&self, input: usize, signal: &Signals) -> Vec<Vec<Vec<f64>>> {
+        let (x, v) = (&signal.position, &signal.rate);
+        let u = |s: usize, k: usize| self.data().segments[s].inputs[input][k];
+        let mut drives = Vec::new();
+        for values in [x, v] {
+            for (low, centre, high) in hats(&values.concat(), HATS) {
+                drives.push(self.each(&|s, k| hat(values[s][k], low, centre, high)));
+            }
+        }
+        drives.push(self.each(&|s, k| x[s][k] * u(s, k)));
+        drives.push(self.each(&|s, k| x[s][k] * v[s][k]));
+        drives.extend(plays(x));
+        drives
+    }
+
+    /// What `columns` explain of the residual beyond the free numbers.
+    fn gain_of(&self, columns: &[Vec<f64>]) -> Option<(f64, f64, usize)> {
         let count = columns.len();
         let rows = self.weights.len();
         if count == 0 || rows < 4 * count {
             return None;
         }
         let mut before = Vec::with_capacity(count);
-        for column in &columns {
+        for column in columns {
             before.push(column.iter().map(|v| v * v).sum::<f64>().max(1e-300));
         }
         let columns = self.projected(&DMatrix::from_vec(rows, count, columns.concat()));
@@ -196,6 +244,26 @@ impl Bench<'_> {
         gain.is_finite()
             .then(|| (gain, coefficients, inverse * variance))
     }
+}
+
+/// Play of some widths: what friction, backlash and hysteresis have in common.
+fn plays(values: &[Vec<f64>]) -> Vec<Vec<Vec<f64>>> {
+    let size = effects::level(&values.concat(), 0.8, f64::abs);
+    PLAYS
+        .map(|share| {
+            values
+                .iter()
+                .map(|x| {
+                    x.iter()
+                        .scan(x.first().copied().unwrap_or(0.0), |held, x| {
+                            *held = f64::clamp(*held, x - share * size, x + share * size);
+                            Some(*held)
+                        })
+                        .collect()
+                })
+                .collect()
+        })
+        .to_vec()
 }
 
 /// Hats over the quantiles of `values`: `(left foot, top, right foot)`.

@@ -148,7 +148,8 @@ pub(crate) fn inquire(
         }
         let mut gain = base - fit.criterion(count);
         // Where nothing is left there is no second effect to find.
-        let nothing_left = adequacy(&problem, &fit, None).is_some_and(|a| a.p_value > NOTHING_LEFT);
+        let nothing_left = adequacy(&problem, &fit, &finding.boring.given, None)
+            .is_some_and(|a| a.p_value > NOTHING_LEFT);
         let second = if nothing_left {
             None
         } else {
@@ -160,7 +161,12 @@ pub(crate) fn inquire(
             fit = polished;
         }
         finding.gain = gain;
-        finding.adequacy = adequacy(&problem, &fit, Some(finding.boring.best(count)));
+        finding.adequacy = adequacy(
+            &problem,
+            &fit,
+            &finding.boring.given,
+            Some(finding.boring.best(count)),
+        );
         finding.augmented = Some(fit.clone());
         let holds = finding.adequacy.is_none_or(|a| a.holds());
         finding.verdict = if !holds {
@@ -175,7 +181,12 @@ pub(crate) fn inquire(
         };
         finding.model = fit;
     } else {
-        finding.adequacy = adequacy(&problem, finding.boring.best(count), None);
+        finding.adequacy = adequacy(
+            &problem,
+            finding.boring.best(count),
+            &finding.boring.given,
+            None,
+        );
         let holds = finding.adequacy.is_none_or(|a| a.holds());
         finding.verdict = if !holds {
             Verdict::Unexplained
@@ -210,34 +221,26 @@ fn coarse_sensor(problem: &Problem, fit: &Fit) -> Option<(usize, f64, f64)> {
 
 /// What some effects owe beyond the count of their parameters.
 pub(crate) fn penalty(ranked: &Ranked, base: f64, count: usize) -> f64 {
-    let Some(effect) = ranked.fit.structure.new_effects().first() else {
-        return 0.0;
-    };
-    let changes = effect
-        .definition
-        .parameters
-        .iter()
-        .any(|p| p.name == "from" && p.unit == Unit::Second);
-    let mut owed = 0.0;
-    if changes {
-        // A change point is chosen among all samples: it counts about twice (Zhang and Siegmund 2007).
-        owed += (count as f64).ln();
-    }
-    if effect
-        .definition
-        .parameters
-        .iter()
-        .any(|p| p.unit == Unit::Hertz)
-    {
-        // A frequency is chosen among all bins: it counts about twice (Djuric 1996, 3 ln N for a sinusoid).
-        owed += (count as f64).ln();
-    }
-    if effect.definition.id == "hysteresis" && pulls(&ranked.fit, ranked.fit.structure.first_new())
-    {
+    let structure = &ranked.fit.structure;
+    (structure.first_new()..structure.effects.len())
+        .map(|index| owed(ranked, index, base, count))
+        .sum()
+}
+
+/// What effect `index` owes.
+fn owed(ranked: &Ranked, index: usize, base: f64, count: usize) -> f64 {
+    let definition = ranked.fit.structure.effects[index].definition;
+    let searched = definition.parameters.iter().any(|p| {
+        // A change point is chosen among all samples: it counts about twice (Zhang and Siegmund 2007). So does a
+        // frequency, chosen among all bins (Djuric 1996, 3 ln N for a sinusoid).
+        p.name == "from" && p.unit == Unit::Second || p.unit == Unit::Hertz
+    });
+    let mut owed = if searched { (count as f64).ln() } else { 0.0 };
+    if definition.id == "hysteresis" && pulls(&ranked.fit, index) {
         owed += UNUSUAL;
     }
     let gain = (base - ranked.criterion).max(0.0);
-    owed += match effect.definition.id {
+    owed += match definition.id {
         "extra_mode" => MODE_HANDICAP * gain,
         // Nested in a simpler law: it must do better than make up for the imperfection of that law.
         "stribeck_friction" => LAW_IMPERFECTION * gain,

@@ -12,7 +12,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `simulation`, `baseline`, `rebaseline` | the simulation as a model, also from a column of its outputs |
-//! | `coordinates`, `plant`, `structure`, `run` | the augmented model: numbers, effects, the recursion |
+//! | `coordinates`, `plant`, `structure`, `functionals`, `run` | the augmented model: numbers, effects, the recursion |
 //! | `effects` | the library, one file a family |
 //! | `noise`, `fit` | coloured, heavy-tailed noise; Levenberg and Marquardt |
 //! | `screen`, `templates`, `features` | one Gauss-Newton step for everything |
@@ -35,6 +35,7 @@ mod exact;
 mod explanation;
 mod features;
 mod fit;
+mod functionals;
 mod inquiry;
 mod locate;
 mod noise;

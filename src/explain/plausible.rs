@@ -5,15 +5,28 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::effects::{self, Action, Sense, Unit};
 use super::fit::{Effort, Fit, Problem};
+use super::functionals::{Functionals, dot};
 use super::inquiry::{NEEDED, penalty};
 use super::search::{Boring, Ranked};
-use super::structure::{Functionals, Signal, dot};
+use super::structure::Signal;
 
 /// Probability of a larger difference when the plant is as it was given.
 const SAME_PLANT: f64 = 1e-3;
 
 /// Share of the samples that a threshold must leave on either side of it.
 const VISITED: f64 = 0.002;
+
+/// Magnitudes that differ by less are one.
+const ONE_MAGNITUDE: f64 = 0.01;
+
+/// A motion that is in contact for longer than this share of the time has no stop but another plant.
+const MOSTLY_FREE: f64 = 0.5;
+
+/// A mode with more damping has no peak (the response of second order has one below 1/sqrt(2)): it is no resonance.
+const RESONANT: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// Fewer periods in a recording are a trend and no periodic disturbance.
+const FEWEST_PERIODS: f64 = 2.0;
 
 /// A typical speed of the signal that effect `index` looks at.
 pub(crate) fn speed_scale(problem: &Problem, fit: &Fit, index: usize) -> f64 {
@@ -125,6 +138,9 @@ pub(crate) fn sane(problem: &Problem, fit: &Fit) -> bool {
                 return false;
             }
         }
+        if effect.definition.id == "input_asymmetry" && two_levels(problem, effect.channel) {
+            return false;
+        }
         let length: f64 = problem.data.segments[0].samples() as f64 * problem.data.sample_time;
         let start = problem.data.segments[0].start_time;
         effect
@@ -135,9 +151,14 @@ pub(crate) fn sane(problem: &Problem, fit: &Fit) -> bool {
             .all(|(p, v)| match (p.name, p.unit) {
                 // A change needs something before and after it.
                 ("from", Unit::Second) => *v > start + 0.02 * length && *v < start + 0.98 * length,
-                ("limit" | "width" | "stop_position", unit) => {
-                    visited(problem, fit, index, unit, *v)
+                ("limit" | "width", unit) => share_beyond(problem, fit, index, unit, *v)
+                    .is_none_or(|beyond| (VISITED..=1.0 - VISITED).contains(&beyond)),
+                ("stop_position", unit) => share_beyond(problem, fit, index, unit, *v)
+                    .is_none_or(|beyond| (VISITED..=MOSTLY_FREE).contains(&beyond)),
+                ("frequency", _) if effect.definition.id == "periodic_disturbance" => {
+                    v * length > FEWEST_PERIODS
                 }
+                ("damping", _) if effect.definition.id == "extra_mode" => *v < RESONANT,
                 ("presliding_distance", _) => *v < 0.5 * travel(problem, fit, index),
                 ("breakaway_excess", _) => *v > 0.05,
                 ("stribeck_velocity", _) => *v < 1.5 * speed_scale(problem, fit, index),
@@ -146,10 +167,28 @@ pub(crate) fn sane(problem: &Problem, fit: &Fit) -> bool {
     })
 }
 
-/// Whether the motion is on both sides of the threshold `v` often enough for it to be seen.
-fn visited(problem: &Problem, fit: &Fit, index: usize, unit: Unit, v: f64) -> bool {
+/// Whether an input has one magnitude only: another gain for each sign then is an offset.
+fn two_levels(problem: &Problem, input: usize) -> bool {
+    let magnitudes = || {
+        problem
+            .data
+            .segments
+            .iter()
+            .flat_map(move |s| s.inputs[input].iter().map(|u| u.abs()))
+    };
+    let most = magnitudes().fold(0.0, f64::max);
+    magnitudes()
+        .filter(|u| *u < (1.0 - ONE_MAGNITUDE) * most)
+        .count() as f64
+        <= VISITED * magnitudes().count() as f64
+}
+
+/// Share of the samples that are beyond the threshold `v`, on the side where the effect acts.
+/// `None` where the position is not measured.
+fn share_beyond(problem: &Problem, fit: &Fit, index: usize, unit: Unit, v: f64) -> Option<f64> {
     let effect = &fit.structure.effects[index];
     let two_sided = effect.definition.parameters[0].logarithmic;
+    let below = effect.definition.variant.starts_with("lower");
     let values: Vec<f64> = match (unit, effect.signal) {
         (Unit::Input, _) => problem
             .data
@@ -183,33 +222,40 @@ fn visited(problem: &Problem, fit: &Fit, index: usize, unit: Unit, v: f64) -> bo
             .zip(&fit.simulated[j])
             .map(|(a, b)| a - b)
             .collect(),
-        (_, Signal::Integral(_)) => return true,
+        (_, Signal::Integral(_)) => return None,
     };
     let beyond = values
         .iter()
-        .filter(|x| if two_sided { x.abs() > v } else { **x > v })
+        .filter(|x| match (two_sided, below) {
+            (true, _) => x.abs() > v,
+            (false, true) => **x < v,
+            (false, false) => **x > v,
+        })
         .count() as f64;
-    let n = values.len().max(1) as f64;
-    beyond > VISITED * n && beyond < (1.0 - VISITED) * n
+    Some(beyond / values.len().max(1) as f64)
+}
+
+/// Output `o` summed over time: the position that belongs to a speed.
+fn integrated(problem: &Problem, fit: &Fit, o: usize) -> Vec<f64> {
+    fit.simulated
+        .iter()
+        .skip(o)
+        .step_by(problem.data.outputs)
+        .flat_map(|y| {
+            y.iter().scan(0.0, |at, v| {
+                *at += v * problem.data.sample_time;
+                Some(*at)
+            })
+        })
+        .collect()
 }
 
 /// Half the range of the position that effect `index` looks at, as far as outputs tell.
 fn travel(problem: &Problem, fit: &Fit, index: usize) -> f64 {
-    let h = problem.data.sample_time;
     let of = |y: &[f64]| effects::level(y, 0.95, f64::abs);
     match fit.structure.effects[index].signal {
         Signal::Output(o) => of(&fit.simulated[o]),
         Signal::Difference(i, j) => of(&fit.simulated[i]) + of(&fit.simulated[j]),
-        Signal::Integral(o) => {
-            let mut at = 0.0;
-            let path: Vec<f64> = fit.simulated[o]
-                .iter()
-                .map(|v| {
-                    at += v * h;
-                    at
-                })
-                .collect();
-            of(&path)
-        }
+        Signal::Integral(o) => of(&integrated(problem, fit, o)),
     }
 }

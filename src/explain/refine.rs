@@ -96,7 +96,12 @@ pub(crate) const FURTHER: &[Refinement] = &[Refinement {
 /// Refinements of what is in the running: within this share of the best gain.
 const IN_THE_RUNNING: f64 = 0.25;
 
-/// Richer and other forms of the laws that fit well.
+/// The effect that came last: the only one, or the second of a pair.
+fn newest(fit: &Fit) -> Option<&'static Definition> {
+    fit.structure.new_effects().last().map(|e| e.definition)
+}
+
+/// Richer and other forms of the newest effects that fit well.
 pub(crate) fn derived(
     problem: &Problem,
     refinements: &[Refinement],
@@ -119,7 +124,7 @@ pub(crate) fn derived(
         };
         let mut simple_fits: Vec<&Ranked> = ranked
             .iter()
-            .filter(|r| std::ptr::eq(r.fit.structure.new_effects()[0].definition, simple))
+            .filter(|r| newest(&r.fit).is_some_and(|d| std::ptr::eq(d, simple)))
             .collect();
         simple_fits.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
         let best = match refinement.more {
@@ -140,7 +145,7 @@ pub(crate) fn derived(
                 .map(|v| vec![(v * problem.data.sample_time).ln()])
                 .collect(),
             More::Breakaway => {
-                let speed = speed_scale(problem, &best.fit, best.fit.structure.first_new());
+                let speed = speed_scale(problem, &best.fit, best.fit.structure.effects.len() - 1);
                 [0.05, 0.3]
                     .iter()
                     .map(|share| vec![0.4_f64.ln(), (share * speed).ln()])
@@ -149,8 +154,9 @@ pub(crate) fn derived(
         };
         for more in starts {
             let mut structure = best.fit.structure.clone();
-            let at = structure.first_new();
-            structure.effects[at].definition = rich;
+            if let Some(effect) = structure.effects.last_mut() {
+                effect.definition = rich;
+            }
             let mut theta = best.fit.theta.clone();
             theta.extend(more);
             jobs.push((structure, theta, best.fit.noise.clone()));

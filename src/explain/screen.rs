@@ -10,10 +10,11 @@ use nalgebra::{DMatrix, DVector};
 use super::data::{Data, Series};
 use super::effects::{self, Action, Clock, Definition, Sense};
 use super::fit::{Fit, Problem};
+use super::functionals::{Functionals, dot, matched_sign};
 use super::noise::Noise;
 use super::plant::Plant;
 use super::run::run;
-use super::structure::{Direction, Functionals, Instance, Signal, Structure, dot, matched_sign};
+use super::structure::{Direction, Instance, Signal, Structure};
 use crate::linalg::multiply_tn;
 
 /// Lines of the residual's spectrum that are tried as a disturbance.
@@ -188,66 +189,12 @@ impl<'a> Bench<'a> {
     }
 
     pub fn clock(&self, segment: usize) -> Clock {
-        Clock {
-            start: self.data().segments[segment].start_time,
-            step: self.data().sample_time,
-            fresh: false,
-        }
+        clock(self.data(), segment)
     }
 
     /// Positions and rates that forces may look at, from the motion of the basis.
     pub fn signals(&self) -> Vec<Signals> {
-        let l = self.plant.outputs;
-        let rows = Functionals::new(&self.plant);
-        let mut places: Vec<Signal> = (0..l).map(Signal::Output).collect();
-        places.extend((0..l).map(Signal::Integral));
-        for i in 0..l {
-            for j in i + 1..l {
-                places.push(Signal::Difference(i, j));
-            }
-        }
-        let mut reader = self.plant.clone();
-        reader.c.clear();
-        reader.d.clear();
-        for place in &places {
-            let rows = rows.of(&self.plant, *place);
-            reader.c.extend(&rows.position);
-            reader.d.extend(std::iter::repeat_n(0.0, reader.inputs));
-            reader.c.extend(&rows.rate);
-            reader.d.extend(&rows.rate_feedthrough);
-        }
-        reader.outputs = 2 * places.len();
-        let mut found: Vec<Signals> = places
-            .iter()
-            .map(|place| Signals {
-                instance_signal: *place,
-                position: Vec::new(),
-                rate: Vec::new(),
-            })
-            .collect();
-        for (index, segment) in self.data().segments.iter().enumerate() {
-            let x0 = self.basis.structure.initial_state(&self.basis.theta, index);
-            let (inputs, _) = self.basis.structure.effective_inputs(
-                &self.basis.theta,
-                segment,
-                &self.clock(index),
-            );
-            let forces = self.basis.structure.prepare(&self.basis.theta, &self.plant);
-            let read = run(
-                &reader,
-                &forces,
-                x0,
-                &inputs,
-                segment.samples(),
-                &self.clock(index),
-            )
-            .unwrap_or_else(|| vec![vec![0.0; segment.samples()]; reader.outputs]);
-            for (signals, pair) in found.iter_mut().zip(read.chunks_exact(2)) {
-                signals.position.push(pair[0].clone());
-                signals.rate.push(pair[1].clone());
-            }
-        }
-        found
+        motions(self.problem, self.basis, &self.plant)
     }
 
     /// Frequencies (Hz) of the largest lines of the residual's periodogram, whitened, all outputs together.
@@ -387,7 +334,10 @@ impl<'a> Bench<'a> {
                 v.clamp(p.lower, p.upper)
             }
         }));
-        if matches!(definition.action, Action::Mode | Action::MissingPath) {
+        if matches!(
+            definition.action,
+            Action::Mode | Action::Sine | Action::MissingPath
+        ) {
             start.extend_from_slice(coefficients);
         }
         let n = self.weights.len() as f64;
@@ -428,4 +378,65 @@ pub(crate) fn extended(structure: &Structure, theta: &[f64], lead: &Lead) -> (St
     let mut start = theta.to_vec();
     start.extend_from_slice(&lead.start);
     (structure, start)
+}
+
+/// Positions and rates that forces may look at, from the motion of `fit`, whose plant is `plant`.
+pub(crate) fn motions(problem: &Problem, fit: &Fit, plant: &Plant) -> Vec<Signals> {
+    let l = plant.outputs;
+    let rows = Functionals::new(plant);
+    let mut places: Vec<Signal> = (0..l).map(Signal::Output).collect();
+    places.extend((0..l).map(Signal::Integral));
+    for i in 0..l {
+        for j in i + 1..l {
+            places.push(Signal::Difference(i, j));
+        }
+    }
+    let mut reader = plant.clone();
+    reader.c.clear();
+    reader.d.clear();
+    for place in &places {
+        let rows = rows.of(plant, *place);
+        reader.c.extend(&rows.position);
+        reader.d.extend(std::iter::repeat_n(0.0, reader.inputs));
+        reader.c.extend(&rows.rate);
+        reader.d.extend(&rows.rate_feedthrough);
+    }
+    reader.outputs = 2 * places.len();
+    let mut found: Vec<Signals> = places
+        .iter()
+        .map(|place| Signals {
+            instance_signal: *place,
+            position: Vec::new(),
+            rate: Vec::new(),
+        })
+        .collect();
+    for (index, segment) in problem.data.segments.iter().enumerate() {
+        let x0 = fit.structure.initial_state(&fit.theta, index);
+        let (inputs, _) =
+            fit.structure
+                .effective_inputs(&fit.theta, segment, &clock(problem.data, index));
+        let forces = fit.structure.prepare(&fit.theta, plant);
+        let read = run(
+            &reader,
+            &forces,
+            x0,
+            &inputs,
+            segment.samples(),
+            &clock(problem.data, index),
+        )
+        .unwrap_or_else(|| vec![vec![0.0; segment.samples()]; reader.outputs]);
+        for (signals, pair) in found.iter_mut().zip(read.chunks_exact(2)) {
+            signals.position.push(pair[0].clone());
+            signals.rate.push(pair[1].clone());
+        }
+    }
+    found
+}
+
+fn clock(data: &Data, segment: usize) -> Clock {
+    Clock {
+        start: data.segments[segment].start_time,
+        step: data.sample_time,
+        fresh: false,
+    }
 }

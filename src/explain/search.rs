@@ -4,9 +4,10 @@ use rayon::prelude::*;
 
 use super::effects::{self, Definition, Unit};
 use super::fit::{Effort, Fit, Problem};
+use super::functionals::Functionals;
 use super::noise::Noise;
 use super::screen::{Lead, extended, screen};
-use super::structure::{Direction, Functionals, Instance, Signal, Structure};
+use super::structure::{Direction, Instance, Signal, Structure};
 
 /// Effects that are fitted in full from each screening.
 const LEADS_EACH: usize = 6;

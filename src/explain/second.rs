@@ -3,7 +3,9 @@
 use super::data::Series;
 use super::effects::Definition;
 use super::fit::{Effort, Fit, Problem};
+use super::inquiry::penalty;
 use super::plausible::sane;
+use super::refine::{REFINEMENTS, derived};
 use super::search::{Ranked, second_effects};
 
 /// A second effect must bring this share of what the first brought: misfit of the first breeds false seconds
@@ -41,7 +43,11 @@ pub(crate) fn pair(
         }
     }
     let single_gain = base - best.criterion;
-    let found = second_effects(problem, &firsts, allowed);
+    let mut found = second_effects(problem, &firsts, allowed);
+    found.extend(derived(problem, REFINEMENTS, &found, base, allowed));
+    for r in &mut found {
+        r.criterion += penalty(r, base, count);
+    }
     let found = found
         .into_iter()
         .filter(|r| {
@@ -52,7 +58,7 @@ pub(crate) fn pair(
         })
         .filter(|r| sane(problem, &r.fit))
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
-    let gain = best.criterion - found.fit.criterion(count);
+    let gain = best.criterion - found.criterion;
     let enough = gain > SECOND_GAIN.max(SECOND_SHARE * single_gain);
     // Blocks that were not fitted make up a share of the recording: a real gain shows there in proportion.
     let seen_again = || {

@@ -96,6 +96,11 @@ pub(crate) fn know(recordings: &[Log], simulation: &Simulation) -> Result<Known,
     Ok(known)
 }
 
+/// "1 input", "2 inputs".
+fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
 fn simulation_name(simulation: &Simulation) -> String {
     match simulation {
         Simulation::Model(_, name) => name.clone(),
@@ -105,26 +110,21 @@ fn simulation_name(simulation: &Simulation) -> String {
 
 fn of_model(recordings: &[Log], model: &Model, name: &str) -> Result<Known, ExplainError> {
     let first = &recordings[0];
-    let wrong = |what: String| ExplainError::Channels {
+    let wrong = |simulated: String, recorded: usize, option: &'static str| ExplainError::Channels {
         simulation: name.to_owned(),
-        what,
+        simulated,
+        recording: first.name.clone(),
+        recorded,
+        option,
     };
     let system = &model.system;
     if system.inputs() != first.inputs.len() {
-        return Err(wrong(format!(
-            "the model has {} inputs, and {} has {}",
-            system.inputs(),
-            first.name,
-            first.inputs.len()
-        )));
+        let has = format!("the model has {}", counted(system.inputs(), "input"));
+        return Err(wrong(has, first.inputs.len(), "--inputs"));
     }
     if system.outputs() != first.outputs.len() {
-        return Err(wrong(format!(
-            "the model has {} outputs, and {} has {}",
-            system.outputs(),
-            first.name,
-            first.outputs.len()
-        )));
+        let has = format!("the model has {}", counted(system.outputs(), "output"));
+        return Err(wrong(has, first.outputs.len(), "--outputs"));
     }
     if relative_difference(system.sample_time, first.sample_time) > SAMPLING_TOLERANCE {
         return Err(ExplainError::Sampling {
@@ -283,12 +283,10 @@ fn check_outputs(recordings: &[Log], logs: &[Log]) -> Result<(), ExplainError> {
         if log.outputs.len() != simulated.outputs.len() {
             return Err(ExplainError::Channels {
                 simulation: simulated.name.clone(),
-                what: format!(
-                    "{} simulated outputs, and {} has {}",
-                    simulated.outputs.len(),
-                    log.name,
-                    log.outputs.len()
-                ),
+                simulated: counted(simulated.outputs.len(), "simulated output"),
+                recording: log.name.clone(),
+                recorded: log.outputs.len(),
+                option: "--outputs",
             });
         }
         for (ours, theirs) in log.outputs.iter().zip(&simulated.outputs) {

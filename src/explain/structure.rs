@@ -10,6 +10,7 @@ use std::sync::Arc;
 use super::coordinates::{Coordinates, Derivatives};
 use super::data::{Data, Segment, Series};
 use super::effects::{Action, Clock, Definition};
+use super::functionals::{Functionals, dot, matched_sign};
 use super::plant::Plant;
 use super::run::{ActiveForce, run};
 
@@ -63,10 +64,11 @@ impl Instance {
         }
     }
 
-    /// Numbers after the shape parameters: residues of a mode, the column of a missing path.
+    /// Numbers after the shape parameters: residues of a mode, cosine and sine parts at the outputs, the column of a
+    /// missing path.
     pub fn coefficients(&self, states: usize, outputs: usize) -> usize {
         match self.definition.action {
-            Action::Mode => 2 * outputs,
+            Action::Mode | Action::Sine => 2 * outputs,
             Action::MissingPath => states,
             _ => 0,
         }
@@ -434,6 +436,11 @@ impl Structure {
             }
         }
         for (index, effect) in self.effects.iter().enumerate() {
+            if matches!(effect.definition.action, Action::Sine) && !clock.fresh {
+                let parts =
+                    &self.effect_numbers(theta, index)[effect.definition.parameters.len()..];
+                add_sine(self.shape(theta, index)[0], parts, clock, &mut outputs);
+            }
             if let Action::Sensor(law) = effect.definition.action
                 && (effect.definition.persists || !clock.fresh)
             {
@@ -471,6 +478,17 @@ pub(crate) fn with_moments(plant: &Plant) -> Plant {
     wider
 }
 
+/// Adds `c cos(2 pi f t) + s sin(2 pi f t)` to each output, `parts` being `c, s` of each.
+pub(crate) fn add_sine(frequency: f64, parts: &[f64], clock: &Clock, outputs: &mut Series) {
+    let turn = std::f64::consts::TAU * frequency;
+    for (output, part) in outputs.iter_mut().zip(parts.chunks_exact(2)) {
+        for (k, y) in output.iter_mut().enumerate() {
+            let (s, c) = (turn * clock.time(k)).sin_cos();
+            *y += part[0] * c + part[1] * s;
+        }
+    }
+}
+
 /// Adds the response of a second-order mode, `q+ = p q + (1 - |p|) u`, `y += a Re q + b Im q`.
 pub(crate) fn add_mode(
     shape: &[f64],
@@ -492,96 +510,4 @@ pub(crate) fn add_mode(
         }
         (q_re, q_im) = (re * q_re - im * q_im + gain * u, re * q_im + im * q_re);
     }
-}
-
-/// Rows of a position, its rate, and what inputs add to the rate directly.
-#[derive(Debug, Clone)]
-pub(crate) struct SignalRows {
-    pub position: Vec<f64>,
-    pub rate: Vec<f64>,
-    pub rate_feedthrough: Vec<f64>,
-}
-
-/// All rows that a plant's signals can be read with.
-#[derive(Debug, Clone)]
-pub(crate) struct Functionals {
-    derivatives: Derivatives,
-}
-
-impl Functionals {
-    pub fn new(plant: &Plant) -> Self {
-        Self {
-            derivatives: Derivatives::new(plant),
-        }
-    }
-
-    /// Whether the output's integral can be read off the state: it must be a derivative, with no static gain.
-    pub fn integrates(&self, plant: &Plant, output: usize) -> bool {
-        let Some(integral) = &self.derivatives.integral else {
-            return false;
-        };
-        // d/dt (C A_c^-1 x) = C x + C A_c^-1 B_c u: the second term is minus the static gain.
-        let n = plant.states;
-        let identity = nalgebra::DMatrix::identity(n, n);
-        let Some(inverse) = (identity - plant.a_matrix()).try_inverse() else {
-            return false;
-        };
-        let static_gain = plant.c_matrix() * inverse * plant.b_matrix();
-        let row_norm: f64 = integral[output].iter().map(|v| v * v).sum::<f64>().sqrt();
-        let peak = impulse_size(plant, output);
-        row_norm.is_finite()
-            && (0..plant.inputs).all(|j| static_gain[(output, j)].abs() < 0.02 * peak)
-    }
-
-    pub fn of(&self, plant: &Plant, signal: Signal) -> SignalRows {
-        let d = &self.derivatives;
-        let minus =
-            |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
-        match signal {
-            Signal::Output(o) => SignalRows {
-                position: plant.c_row(o).to_vec(),
-                rate: d.rate[o].clone(),
-                rate_feedthrough: d.rate_feedthrough[o].clone(),
-            },
-            Signal::Integral(o) => SignalRows {
-                position: d
-                    .integral
-                    .as_ref()
-                    .map_or_else(|| vec![0.0; plant.states], |rows| rows[o].clone()),
-                rate: plant.c_row(o).to_vec(),
-                rate_feedthrough: plant.d[o * plant.inputs..(o + 1) * plant.inputs].to_vec(),
-            },
-            Signal::Difference(i, j) => SignalRows {
-                position: minus(plant.c_row(i), plant.c_row(j)),
-                rate: minus(&d.rate[i], &d.rate[j]),
-                rate_feedthrough: minus(&d.rate_feedthrough[i], &d.rate_feedthrough[j]),
-            },
-        }
-    }
-}
-
-/// Sum of the magnitudes of the impulse response of an output: the most that inputs of size 1 can do.
-fn impulse_size(plant: &Plant, output: usize) -> f64 {
-    let a = plant.a_matrix();
-    let mut x = plant.b_matrix();
-    let c = plant.c_matrix();
-    let mut total = 0.0;
-    for _ in 0..2000 {
-        total += (c.row(output) * &x).norm();
-        x = &a * x;
-    }
-    total.max(1e-300)
-}
-
-/// Sign that lets a positive matched amplitude push the rate up.
-pub(crate) fn matched_sign(plant: &Plant, rate: &[f64], input: usize) -> f64 {
-    if dot(rate, &plant.b_column(input)) < 0.0 {
-        -1.0
-    } else {
-        1.0
-    }
-}
-
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

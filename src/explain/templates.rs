@@ -2,10 +2,11 @@
 
 use super::data::Series;
 use super::effects::{self, Action, Definition, Motion, Needs, Observed};
+use super::functionals::Functionals;
 use super::plant::Plant;
 use super::run::run;
 use super::screen::{Bench, Signals, Template};
-use super::structure::{Direction, Functionals, Instance, Signal, add_mode};
+use super::structure::{Direction, Instance, Signal, add_mode, add_sine};
 
 /// Times of change that are tried over a recording.
 const CHANGE_TIMES: usize = 40;
@@ -26,8 +27,9 @@ impl Bench<'_> {
                 .flat_map(|j| self.input_templates(definition, j))
                 .collect(),
             Action::Sensor(_) => (0..self.data().outputs)
-                .flat_map(|o| self.sensor_templates(definition, o, lines))
+                .flat_map(|o| self.sensor_templates(definition, o))
                 .collect(),
+            Action::Sine => self.sine_templates(definition, lines),
             Action::Force(_, needs, _) => self.force_templates(definition, needs, signals),
             Action::Mode => (0..self.data().signals())
                 .filter(|j| self.basis.structure.coordinates.active_inputs.contains(j))
@@ -157,12 +159,38 @@ impl Bench<'_> {
             .collect()
     }
 
-    fn sensor_templates(
-        &self,
-        definition: &'static Definition,
-        output: usize,
-        lines: &[f64],
-    ) -> Vec<Template> {
+    fn sine_templates(&self, definition: &'static Definition, lines: &[f64]) -> Vec<Template> {
+        let observed = self.observed(Vec::new(), Vec::new(), lines);
+        let l = self.data().outputs;
+        (definition.starts)(&observed)
+            .into_iter()
+            .map(|shape| {
+                let part = |i: usize| -> Series {
+                    let mut parts = vec![0.0; 2 * l];
+                    parts[i] = 1.0;
+                    let mut series = Vec::new();
+                    for (index, segment) in self.data().segments.iter().enumerate() {
+                        let mut y = vec![vec![0.0; segment.samples()]; l];
+                        add_sine(shape[0], &parts, &self.clock(index), &mut y);
+                        series.extend(y);
+                    }
+                    series
+                };
+                Template {
+                    instance: Instance {
+                        definition,
+                        channel: 0,
+                        signal: Signal::Output(0),
+                        direction: Direction::Free,
+                    },
+                    columns: (0..2 * l).map(part).collect(),
+                    shape,
+                }
+            })
+            .collect()
+    }
+
+    fn sensor_templates(&self, definition: &'static Definition, output: usize) -> Vec<Template> {
         let Action::Sensor(law) = definition.action else {
             return Vec::new();
         };
@@ -175,7 +203,7 @@ impl Bench<'_> {
             .flatten()
             .copied()
             .collect();
-        let observed = self.observed(channel, Vec::new(), lines);
+        let observed = self.observed(channel, Vec::new(), &[]);
         let change = |shape: &[f64], scale: f64| -> Series {
             simulated
                 .iter()
@@ -234,24 +262,19 @@ impl Bench<'_> {
             return Vec::new();
         };
         let rows = Functionals::new(&self.plant);
-        let speed: Vec<bool> = (0..self.plant.outputs)
-            .map(|o| rows.integrates(&self.plant, o))
-            .collect();
         let aperiodic = crate::linalg::eigenvalues(&self.plant.a_matrix())
             .is_ok_and(|poles| poles.iter().all(|p| p.im == 0.0));
         let mut templates = Vec::new();
         for signal in signals {
-            // An output without static gain is a speed: positions are its integral. One of a plant that cannot
-            // oscillate (a drive) may be a speed as well as a position, so friction is tried on both.
+            // One output of a plant that cannot oscillate (a drive) may be a speed as well as a position, so friction
+            // is tried on both.
+            let drive = || aperiodic && definition.id != "quadratic_drag";
             let possible = match (needs, signal.instance_signal) {
-                (Needs::Time, Signal::Output(0)) => true,
-                (Needs::Time, _) => false,
-                (Needs::Position | Needs::Rate, Signal::Output(o)) => !speed[o],
-                (Needs::Position, Signal::Integral(o)) => speed[o],
-                (Needs::Rate, Signal::Integral(o)) => {
-                    speed[o] || aperiodic && definition.id != "quadratic_drag"
+                (Needs::Time, place) => place == Signal::Output(0),
+                (Needs::Rate, place @ Signal::Integral(_)) => {
+                    drive() || rows.sensible(&self.plant, place)
                 }
-                (_, Signal::Difference(i, j)) => !speed[i] && !speed[j],
+                (Needs::Position | Needs::Rate, place) => rows.sensible(&self.plant, place),
             };
             if !possible {
                 continue;

@@ -1,7 +1,7 @@
 //! Units, sentences and summaries.
 
 use super::effects::{Definition, Port, Unit};
-use super::explanation::{EffectFound, Explanation, Quantity, Verdict};
+use super::explanation::{EFFECTS_TIE, EffectFound, Explanation, Quantity, Verdict};
 use crate::log::Channel;
 
 /// Unit of a parameter, as far as the channels' units tell.
@@ -109,10 +109,11 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
         Verdict::Named => lines.extend(e.effects.iter().map(|f| f.sentence.clone())),
         Verdict::Family => {
             lines.extend(e.effects.iter().map(|f| f.sentence.clone()));
+            let best = e.effects.first().map_or(0.0, |f| f.evidence.criterion_gain);
             let ties: Vec<String> = e
                 .alternatives
                 .iter()
-                .filter(|a| a.support > 0.9)
+                .filter(|a| best - a.criterion_gain < EFFECTS_TIE)
                 .take(3)
                 .map(|a| a.effect.replace('_', " "))
                 .collect();
@@ -175,7 +176,13 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
             .collect();
         lines.push(format!("{}.", changes.join("; ").trim_end()));
     }
-    if let (Verdict::Named | Verdict::Family, Some(rival)) = (e.verdict, e.alternatives.first()) {
+    // The best rival that lost; those that tie are named above.
+    let best = e.effects.first().map_or(0.0, |f| f.evidence.criterion_gain);
+    let lost = e
+        .alternatives
+        .iter()
+        .find(|a| best - a.criterion_gain >= EFFECTS_TIE);
+    if let (Verdict::Named | Verdict::Family, Some(rival)) = (e.verdict, lost) {
         lines.push(format!(
             "Not {}: {}.",
             rival.effect.replace('_', " "),

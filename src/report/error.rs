@@ -19,8 +19,8 @@ pub enum DocumentError {
     NotText { name: String },
     /// The text is something else than JSON.
     #[error(
-        "{name}: this is not a JSON document: it starts with `{start}`; the model comes first, then the recording: \
-         `innovant {{simulate|validate}} MODEL.json LOG.csv`"
+        "{name}: this is not a JSON document: it starts with `{start}`; give the model that `innovant identify --output` \
+         wrote (for simulate and validate the model comes first, then the recording)"
     )]
     NotJson { name: String, start: String },
     /// JSON with a mistake in it, or the wrong type of value somewhere.

@@ -1,26 +1,22 @@
 //! What acts on the plant and was not commanded, and paths that the simulation lacks.
 
-use super::{Action, Clock, Definition, Mimic, Motion, Needs, Parameter, Sense, Unit};
+use super::{Action, Definition, Mimic, Motion, Needs, Parameter, Sense, Unit};
 
 pub(super) static ENTRIES: &[Definition] = &[
     Definition {
         id: "periodic_disturbance",
         variant: "",
         name: "periodic disturbance",
-        equation: "y = y_true + c cos(2 pi f t) + s sin(2 pi f t)",
-        parameters: &[
-            Parameter::positive("frequency", Unit::Hertz),
-            Parameter::real("cosine", Unit::Position),
-            Parameter::real("sine", Unit::Position),
-        ],
+        equation: "y = y_true + a cos(2 pi f t + phase), an amplitude and a phase at each output",
+        parameters: &[Parameter::positive("frequency", Unit::Hertz)],
         mimics: &[Mimic {
             effect: "extra_mode",
             experiment: "record without any input: a disturbance is still there, a resonance is not",
         }],
-        linear: &[1, 2],
+        linear: &[],
         persists: false,
-        action: Action::Sensor(sine),
-        starts: |seen| seen.lines.iter().map(|f| vec![*f, 0.0, 0.0]).collect(),
+        action: Action::Sine,
+        starts: |seen| seen.lines.iter().map(|f| vec![*f]).collect(),
     },
     Definition {
         id: "load_step",
@@ -80,14 +76,6 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: |_| vec![vec![]],
     },
 ];
-
-fn sine(p: &[f64], y: &mut [f64], clock: &Clock) {
-    let turn = std::f64::consts::TAU * p[0];
-    for (k, y) in y.iter_mut().enumerate() {
-        let (s, c) = (turn * clock.time(k)).sin_cos();
-        *y += p[1] * c + p[2] * s;
-    }
-}
 
 fn step(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     motion.clock.share_after(motion.sample, p[0])

@@ -144,6 +144,8 @@ pub(crate) enum Action {
     Sensor(ChannelLaw),
     /// A second-order path beside the plant (`extra_mode`).
     Mode,
+    /// A sinusoid in time at every output, which a periodic force in the plant makes as well as a pickup at a sensor.
+    Sine,
     /// The path of an input that the simulation lacks (`missing_input`).
     MissingPath,
     /// Found by an exact test; in the model it is a sensor law without effect on fits.
@@ -157,6 +159,7 @@ impl std::fmt::Debug for Action {
             Self::Force(..) => "Force",
             Self::Sensor(_) => "Sensor",
             Self::Mode => "Mode",
+            Self::Sine => "Sine",
             Self::MissingPath => "MissingPath",
             Self::Exact => "Exact",
         })
@@ -208,7 +211,7 @@ impl Definition {
         match self.action {
             Action::Input(_) => Port::Input,
             Action::Force(..) => Port::Force,
-            Action::Sensor(_) => Port::Sensor,
+            Action::Sensor(_) | Action::Sine => Port::Sensor,
             Action::Mode | Action::MissingPath => Port::Path,
             Action::Exact => Port::Exact,
         }

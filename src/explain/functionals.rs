@@ -1,0 +1,107 @@
+//! What can be read off a state: positions, rates, and integrals of outputs.
+
+use super::coordinates::Derivatives;
+use super::plant::Plant;
+use super::structure::Signal;
+
+/// Rows of a position, its rate, and what inputs add to the rate directly.
+#[derive(Debug, Clone)]
+pub(crate) struct SignalRows {
+    pub position: Vec<f64>,
+    pub rate: Vec<f64>,
+    pub rate_feedthrough: Vec<f64>,
+}
+
+/// All rows that a plant's signals can be read with.
+#[derive(Debug, Clone)]
+pub(crate) struct Functionals {
+    derivatives: Derivatives,
+}
+
+impl Functionals {
+    pub fn new(plant: &Plant) -> Self {
+        Self {
+            derivatives: Derivatives::new(plant),
+        }
+    }
+
+    /// Whether the output's integral can be read off the state: it must be a derivative, with no static gain.
+    pub fn integrates(&self, plant: &Plant, output: usize) -> bool {
+        let Some(integral) = &self.derivatives.integral else {
+            return false;
+        };
+        // d/dt (C A_c^-1 x) = C x + C A_c^-1 B_c u: the second term is minus the static gain.
+        let n = plant.states;
+        let identity = nalgebra::DMatrix::identity(n, n);
+        let Some(inverse) = (identity - plant.a_matrix()).try_inverse() else {
+            return false;
+        };
+        let static_gain = plant.c_matrix() * inverse * plant.b_matrix();
+        let row_norm: f64 = integral[output].iter().map(|v| v * v).sum::<f64>().sqrt();
+        let peak = impulse_size(plant, output);
+        row_norm.is_finite()
+            && (0..plant.inputs).all(|j| static_gain[(output, j)].abs() < 0.02 * peak)
+    }
+
+    /// Whether a position can be what `signal` says: an output without static gain is a speed, and positions are its
+    /// integral.
+    pub fn sensible(&self, plant: &Plant, signal: Signal) -> bool {
+        match signal {
+            Signal::Output(o) => !self.integrates(plant, o),
+            Signal::Integral(o) => self.integrates(plant, o),
+            Signal::Difference(i, j) => !self.integrates(plant, i) && !self.integrates(plant, j),
+        }
+    }
+
+    pub fn of(&self, plant: &Plant, signal: Signal) -> SignalRows {
+        let d = &self.derivatives;
+        let minus =
+            |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
+        match signal {
+            Signal::Output(o) => SignalRows {
+                position: plant.c_row(o).to_vec(),
+                rate: d.rate[o].clone(),
+                rate_feedthrough: d.rate_feedthrough[o].clone(),
+            },
+            Signal::Integral(o) => SignalRows {
+                position: d
+                    .integral
+                    .as_ref()
+                    .map_or_else(|| vec![0.0; plant.states], |rows| rows[o].clone()),
+                rate: plant.c_row(o).to_vec(),
+                rate_feedthrough: plant.d[o * plant.inputs..(o + 1) * plant.inputs].to_vec(),
+            },
+            Signal::Difference(i, j) => SignalRows {
+                position: minus(plant.c_row(i), plant.c_row(j)),
+                rate: minus(&d.rate[i], &d.rate[j]),
+                rate_feedthrough: minus(&d.rate_feedthrough[i], &d.rate_feedthrough[j]),
+            },
+        }
+    }
+}
+
+/// Sum of the magnitudes of the impulse response of an output: the most that inputs of size 1 can do.
+fn impulse_size(plant: &Plant, output: usize) -> f64 {
+    let a = plant.a_matrix();
+    let mut x = plant.b_matrix();
+    let c = plant.c_matrix();
+    let mut total = 0.0;
+    for _ in 0..2000 {
+        total += (c.row(output) * &x).norm();
+        x = &a * x;
+    }
+    total.max(1e-300)
+}
+
+/// Sign that lets a positive matched amplitude push the rate up.
+pub(crate) fn matched_sign(plant: &Plant, rate: &[f64], input: usize) -> f64 {
+    if dot(rate, &plant.b_column(input)) < 0.0 {
+        -1.0
+    } else {
+        1.0
+    }
+}
+
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
