@@ -31,9 +31,11 @@ impl Answer<'_> {
     pub(crate) fn effects(&self, problem: &Problem, model: &Fit) -> Vec<EffectFound> {
         let mut fit = model.clone();
         let covariance = fit.covariance(problem);
+        let disagreement = fit.halves_disagree(problem);
         let mut found = Vec::new();
-        for index in model.structure.first_new()..model.structure.effects.len() {
-            let effect = &model.structure.effects[index];
+        let structure = &model.structure;
+        for index in structure.first_new()..structure.effects.len() {
+            let effect = &structure.effects[index];
             let definition = effect.definition;
             let signal = self.signal_name(effect);
             let (input, output) = self.channels_of(effect);
@@ -74,7 +76,13 @@ impl Answer<'_> {
                     criterion_gain: self.finding.gain,
                     criterion_needed: NEEDED,
                     heldout_gain: None,
-                    halves_disagree: None,
+                    // What begins at some time is not in both halves.
+                    halves_disagree: disagreement.as_ref().filter(|_| !definition.changes()).map(
+                        |z| {
+                            let end = offset + effect.len(structure.states(), structure.outputs());
+                            z[offset..end].iter().copied().fold(0.0, f64::max)
+                        },
+                    ),
                 },
                 sentence: String::new(),
             };

@@ -103,6 +103,7 @@ impl AugmentedModel {
                 .map(|s| structure.initial_state(theta, s).to_vec())
                 .collect(),
             effects,
+            substeps: structure.substeps,
             reference: None,
         }
     }
@@ -277,6 +278,13 @@ impl AugmentedModel {
         if n > super::run::MOST_STATES || l == 0 || r == 0 {
             return Err(damaged("too many states, or no input or output"));
         }
+        if !(1..=super::finer::MOST_STEPS).contains(&self.substeps) {
+            return Err(damaged(&format!(
+                "substeps is {}, and can be 1 to {}",
+                self.substeps,
+                super::finer::MOST_STEPS
+            )));
+        }
         if !(self.sample_time.is_finite() && self.sample_time > 0.0) {
             return Err(damaged("the sample time is not positive"));
         }
@@ -346,6 +354,7 @@ impl AugmentedModel {
             initial_free: false,
             initial: self.initial_states.clone(),
             feedthrough_free: false,
+            substeps: self.substeps,
             effects: instances,
             known,
             adjusted: 0,

@@ -13,6 +13,15 @@ use crate::report::Rows;
 pub const EXPLANATION_FORMAT: &str = "innovant-explanation/1";
 
 /// Answers whose criteria differ by less explain the recording equally well (Kass and Raftery 1995: 6 is "strong").
+fn one() -> usize {
+    1
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_one(steps: &usize) -> bool {
+    *steps == 1
+}
+
 pub(crate) const EFFECTS_TIE: f64 = 6.0;
 
 /// The answer's kind.
@@ -380,6 +389,9 @@ pub struct AugmentedModel {
     pub initial_states: Vec<Vec<f64>>,
     /// Effects; those that the simulation knew already come first.
     pub effects: Vec<ModelEffect>,
+    /// Steps of the recursion in a sample interval.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub substeps: usize,
     /// What stood for a simulator that is known by its outputs alone: its answer to a new input is corrected by the
     /// difference of the two models.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -205,7 +205,7 @@ impl Fit {
             let Some(derivatives) = &jacobian else {
                 return;
             };
-            let system = derivatives.normal_equations(problem, noise, &self.residual);
+            let system = derivatives.normal_equations(problem, noise, &self.residual, None);
             let mut gained = None;
             for _ in 0..if fresh { 8 } else { 1 } {
                 let Some(step) = system.step(damping) else {
@@ -325,27 +325,45 @@ impl Fit {
     pub fn covariance(&mut self, problem: &Problem) -> Option<DMatrix<f64>> {
         let noise = self.noise.clone();
         let jacobian = self.jacobian(problem, &noise)?;
-        let system = jacobian.normal_equations(problem, &noise, &self.residual);
-        let m = system.used.len();
-        let scale: Vec<f64> = (0..m)
-            .map(|i| system.hessian[(i, i)].sqrt().max(1e-300))
+        jacobian
+            .normal_equations(problem, &noise, &self.residual, None)
+            .covariance()
+    }
+
+    /// How far the two halves of the recordings disagree about each number, in standard deviations of the difference:
+    /// one Gauss-Newton step of each half from the common optimum, which is as good as a fit of each (one-step
+    /// estimation, Le Cam 1956). Numbers that move nothing, or that a half does not determine, disagree by zero.
+    pub fn halves_disagree(&mut self, problem: &Problem) -> Option<Vec<f64>> {
+        let noise = self.noise.clone();
+        let jacobian = self.jacobian(problem, &noise)?;
+        let first: Vec<bool> = problem
+            .mask
+            .iter()
+            .flat_map(|mask| {
+                let n = mask.len();
+                mask.iter()
+                    .enumerate()
+                    .filter_map(move |(k, keep)| keep.then_some(2 * k < n))
+            })
             .collect();
-        let mut scaled = system.hessian.clone();
-        for i in 0..m {
-            for j in 0..m {
-                scaled[(i, j)] /= scale[i] * scale[j];
-            }
-            scaled[(i, i)] += 1e-12;
-        }
-        let inverse = scaled.cholesky()?.inverse();
-        let n = self.theta.len();
-        let mut covariance = DMatrix::zeros(n, n);
-        for (i, &a) in system.used.iter().enumerate() {
-            for (j, &b) in system.used.iter().enumerate() {
-                covariance[(a, b)] = inverse[(i, j)] / (scale[i] * scale[j]);
-            }
-        }
-        Some(covariance)
+        let half = |rows: &[bool]| {
+            let system = jacobian.normal_equations(problem, &noise, &self.residual, Some(rows));
+            Some((system.step(0.0)?, system.covariance()?))
+        };
+        let second: Vec<bool> = first.iter().map(|first| !first).collect();
+        let ((a, va), (b, vb)) = (half(&first)?, half(&second)?);
+        Some(
+            (0..self.theta.len())
+                .map(|i| {
+                    let variance = va[(i, i)] + vb[(i, i)];
+                    if variance > 0.0 {
+                        (a[i] - b[i]).abs() / variance.sqrt()
+                    } else {
+                        0.0
+                    }
+                })
+                .collect(),
+        )
     }
 }
 
@@ -357,12 +375,13 @@ struct Jacobian {
 }
 
 impl Jacobian {
-    /// The weighted least-squares system at `residual`.
+    /// The weighted least-squares system at `residual`, of all rows or of those that `only` lets pass.
     fn normal_equations(
         &self,
         problem: &Problem,
         noise: &Noise,
         residual: &Series,
+        only: Option<&[bool]>,
     ) -> NormalEquations {
         let rows = self.columns.nrows();
         let mut weights = Vec::with_capacity(rows);
@@ -375,8 +394,13 @@ impl Jacobian {
                 }
             }
         }
+        for (weight, pass) in weights.iter_mut().zip(only.unwrap_or_default()) {
+            if !pass {
+                *weight = 0.0;
+            }
+        }
         let target = DVector::from_iterator(rows, e.iter().zip(&weights).map(|(e, w)| e * w));
-        let hessian = if noise.degrees.is_finite() {
+        let hessian = if noise.degrees.is_finite() || only.is_some() {
             let mut weighted = self.columns.clone();
             for mut column in weighted.column_iter_mut() {
                 for (v, w) in column.iter_mut().zip(&weights) {
@@ -404,6 +428,29 @@ struct NormalEquations {
 }
 
 impl NormalEquations {
+    /// Inverse of the curvature, for all numbers.
+    fn covariance(&self) -> Option<DMatrix<f64>> {
+        let m = self.used.len();
+        let scale: Vec<f64> = (0..m)
+            .map(|i| self.hessian[(i, i)].sqrt().max(1e-300))
+            .collect();
+        let mut scaled = self.hessian.clone();
+        for i in 0..m {
+            for j in 0..m {
+                scaled[(i, j)] /= scale[i] * scale[j];
+            }
+            scaled[(i, i)] += 1e-12;
+        }
+        let inverse = scaled.cholesky()?.inverse();
+        let mut covariance = DMatrix::zeros(self.total, self.total);
+        for (i, &a) in self.used.iter().enumerate() {
+            for (j, &b) in self.used.iter().enumerate() {
+                covariance[(a, b)] = inverse[(i, j)] / (scale[i] * scale[j]);
+            }
+        }
+        Some(covariance)
+    }
+
     /// The damped step, in units of each number's own curvature.
     fn step(&self, damping: f64) -> Option<DVector<f64>> {
         let m = self.used.len();

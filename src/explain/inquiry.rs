@@ -7,7 +7,7 @@ use super::exact::{Freeze, frozen, spacing};
 use super::explanation::Verdict;
 use super::fit::{Effort, Fit, Problem};
 use super::plausible::{add_free_twins, plant_may_stay, pulls, sane};
-use super::refine::{FURTHER, REFINEMENTS, derived};
+use super::refine::{FURTHER, REFINEMENTS, decides_within, derived, finer_steps};
 use super::search::{Boring, Ranked, single_effects};
 use super::second::{heldout_gain, pair, with_feedthrough};
 use super::structure::Structure;
@@ -19,6 +19,8 @@ pub(crate) const NEEDED: f64 = 11.4;
 const TIE: f64 = super::explanation::EFFECTS_TIE;
 /// A missing resonance imitates any linear misfit; it must lead by this share of its gain.
 const MODE_HANDICAP: f64 = 0.01;
+/// Hysteresis nests dry friction with bristles; it must lead by this share of its gain.
+const DRY_HANDICAP: f64 = 0.01;
 /// What an answer owes that physics allows but that is rare, such as a hysteresis that gives energy back: odds of 1
 /// to 400.
 const UNUSUAL: f64 = 12.0;
@@ -112,6 +114,18 @@ pub(crate) fn inquire(
     for refinements in [REFINEMENTS, FURTHER] {
         ranked.extend(derived(&problem, refinements, &ranked, base, allowed));
     }
+    let leader = ranked
+        .iter()
+        .min_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    // A law that leaves structure may only have been run too coarsely.
+    if leader.is_some_and(|r| {
+        base - r.criterion > BEYOND_DOUBT
+            && decides_within(&r.fit)
+            && adequacy(&problem, &r.fit, &finding.boring.given, None)
+                .is_some_and(|a| a.p_value < super::adequacy::LEVEL)
+    }) {
+        ranked.extend(finer_steps(&problem, &ranked, base, allowed));
+    }
     for r in &mut ranked {
         r.criterion += penalty(r, base, count);
     }
@@ -123,7 +137,7 @@ pub(crate) fn inquire(
     finding.rivals = rivals(&ranked, base);
     finding.detectable = detectable(&problem, &ranked);
     let needed = NEEDED;
-    // Blocks that were not fitted must show the gain in proportion to their share, at least by half.
+    // Blocks that were not fitted must show the gain in proportion to their share, as far as chance allows
     // (beside a plant as given the gain is one over that plant: over a free one it is mostly fewer numbers).
     let best = ranked.iter().take(4).find(|r| {
         let gain = base - r.criterion;
@@ -135,7 +149,11 @@ pub(crate) fn inquire(
         let expected = super::prove::SHARE * (before.criterion(count) - r.criterion).max(gain);
         gain > needed
             && (gain > BEYOND_DOUBT
-                || heldout_gain(&problem, before, &r.fit).is_some_and(|held| held > 0.5 * expected))
+                || heldout_gain(&problem, before, &r.fit)
+                    .is_some_and(|held| held > least_heldout(expected)))
+            // Beside the plant as given it wins by fewer numbers; it must explain as much as other parameters do, or
+            // it stands for them (math/explain.md, choice 5).
+            && (r.fit.structure.plant_free || r.fit.deviance < finding.boring.full.deviance)
     });
     if let Some(best) = best {
         let mut fit = polished(&problem, &best.fit);
@@ -156,9 +174,8 @@ pub(crate) fn inquire(
             pair(&problem, &ranked_all, base, allowed)
         };
         if let Some(pair) = second {
-            let polished = polished(&problem, &pair);
-            gain = gain.max(base - polished.criterion(count));
-            fit = polished;
+            gain = gain.max(base - pair.criterion(count));
+            fit = pair;
         }
         finding.gain = gain;
         finding.adequacy = adequacy(
@@ -201,6 +218,12 @@ pub(crate) fn inquire(
     Some((finding, problem.mask))
 }
 
+/// What blocks that were not fitted must show of a gain of which `expected` falls to their share: twice a log
+/// likelihood ratio has a standard deviation of `2 sqrt(mean)`, and one true effect in twenty may be lost.
+fn least_heldout(expected: f64) -> f64 {
+    (expected - 1.645 * 2.0 * expected.max(0.0).sqrt()).max(0.0)
+}
+
 /// An output on a lattice so coarse that rounding is a good part of the residual: `(output, step, share)`.
 fn coarse_sensor(problem: &Problem, fit: &Fit) -> Option<(usize, f64, f64)> {
     problem
@@ -230,11 +253,10 @@ pub(crate) fn penalty(ranked: &Ranked, base: f64, count: usize) -> f64 {
 /// What effect `index` owes.
 fn owed(ranked: &Ranked, index: usize, base: f64, count: usize) -> f64 {
     let definition = ranked.fit.structure.effects[index].definition;
-    let searched = definition.parameters.iter().any(|p| {
-        // A change point is chosen among all samples: it counts about twice (Zhang and Siegmund 2007). So does a
-        // frequency, chosen among all bins (Djuric 1996, 3 ln N for a sinusoid).
-        p.name == "from" && p.unit == Unit::Second || p.unit == Unit::Hertz
-    });
+    // A change point is chosen among all samples: it counts about twice (Zhang and Siegmund 2007). So does a frequency,
+    // chosen among all bins (Djuric 1996, 3 ln N for a sinusoid).
+    let searched =
+        definition.changes() || definition.parameters.iter().any(|p| p.unit == Unit::Hertz);
     let mut owed = if searched { (count as f64).ln() } else { 0.0 };
     if definition.id == "hysteresis" && pulls(&ranked.fit, index) {
         owed += UNUSUAL;
@@ -244,8 +266,10 @@ fn owed(ranked: &Ranked, index: usize, base: f64, count: usize) -> f64 {
         "extra_mode" => MODE_HANDICAP * gain,
         // Nested in a simpler law: it must do better than make up for the imperfection of that law.
         "stribeck_friction" => LAW_IMPERFECTION * gain,
-        // Hardly to be told from a delay, which every sampled loop has.
+        // Hardly to be told from what is far more common: a delay, which every sampled loop has; dry friction, whose
+        // bristles make a loop of their own.
         "actuator_lag" => TIE,
+        "hysteresis" => TIE.max(DRY_HANDICAP * gain),
         _ => 0.0,
     };
     owed
@@ -302,7 +326,7 @@ fn rivals(ranked: &[Ranked], base: f64) -> Vec<Rival> {
 }
 
 /// The fit tried harder.
-fn polished(problem: &Problem, fit: &Fit) -> Fit {
+pub(crate) fn polished(problem: &Problem, fit: &Fit) -> Fit {
     Fit::run(
         problem,
         fit.structure.clone(),

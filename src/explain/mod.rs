@@ -12,7 +12,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `simulation`, `baseline`, `rebaseline` | the simulation as a model, also from a column of its outputs |
-//! | `coordinates`, `plant`, `structure`, `functionals`, `run` | the augmented model: numbers, effects, the recursion |
+//! | `coordinates`, `plant`, `structure`, `functionals`, `run`, `finer` | the augmented model: numbers, effects, the recursion |
 //! | `effects` | the library, one file a family |
 //! | `noise`, `fit` | coloured, heavy-tailed noise; Levenberg and Marquardt |
 //! | `screen`, `templates`, `features` | one Gauss-Newton step for everything |
@@ -34,6 +34,7 @@ mod error;
 mod exact;
 mod explanation;
 mod features;
+mod finer;
 mod fit;
 mod functionals;
 mod inquiry;

@@ -16,6 +16,9 @@ const SAME_PLANT: f64 = 1e-3;
 /// Share of the samples that a threshold must leave on either side of it.
 const VISITED: f64 = 0.002;
 
+/// A breakaway force that exceeds sliding friction by less is what every dry contact does, and no Stribeck curve.
+const BREAKAWAY: f64 = 0.1;
+
 /// Magnitudes that differ by less are one.
 const ONE_MAGNITUDE: f64 = 0.01;
 
@@ -160,7 +163,7 @@ pub(crate) fn sane(problem: &Problem, fit: &Fit) -> bool {
                 }
                 ("damping", _) if effect.definition.id == "extra_mode" => *v < RESONANT,
                 ("presliding_distance", _) => *v < 0.5 * travel(problem, fit, index),
-                ("breakaway_excess", _) => *v > 0.05,
+                ("breakaway_excess", _) => *v > BREAKAWAY,
                 ("stribeck_velocity", _) => *v < 1.5 * speed_scale(problem, fit, index),
                 _ => true,
             })
@@ -251,7 +254,7 @@ fn integrated(problem: &Problem, fit: &Fit, o: usize) -> Vec<f64> {
 }
 
 /// Half the range of the position that effect `index` looks at, as far as outputs tell.
-fn travel(problem: &Problem, fit: &Fit, index: usize) -> f64 {
+pub(crate) fn travel(problem: &Problem, fit: &Fit, index: usize) -> f64 {
     let of = |y: &[f64]| effects::level(y, 0.95, f64::abs);
     match fit.structure.effects[index].signal {
         Signal::Output(o) => of(&fit.simulated[o]),

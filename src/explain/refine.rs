@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::effects::{self, Definition};
 use super::fit::{Effort, Fit, Problem};
 use super::inquiry::NEEDED;
-use super::plausible::speed_scale;
+use super::plausible::{speed_scale, travel};
 use super::search::Ranked;
 use super::structure::Structure;
 
@@ -26,6 +26,8 @@ pub(crate) enum More {
     Breakaway,
     /// Multiples of the sample time.
     Samples(&'static [f64]),
+    /// Shares of the travel.
+    Travel(&'static [f64]),
 }
 
 pub(crate) const REFINEMENTS: &[Refinement] = &[
@@ -93,6 +95,13 @@ pub(crate) const FURTHER: &[Refinement] = &[Refinement {
     more: More::Breakaway,
 }];
 
+/// What a fine step makes worth trying first: elastic bristles, which a coarse step hides.
+const FINE_REFINEMENTS: &[Refinement] = &[Refinement {
+    simple: ("coulomb_friction", ""),
+    rich: ("coulomb_friction", "presliding"),
+    more: More::Travel(&[0.002, 0.01]),
+}];
+
 /// Refinements of what is in the running: within this share of the best gain.
 const IN_THE_RUNNING: f64 = 0.25;
 
@@ -137,6 +146,10 @@ pub(crate) fn derived(
         let Some(best) = best.filter(|_| allowed(rich)) else {
             continue;
         };
+        let there = |r: &Ranked| newest(&r.fit).is_some_and(|d| std::ptr::eq(d, rich));
+        if best.fit.structure.substeps > 1 && ranked.iter().any(there) {
+            continue;
+        }
         let starts: Vec<Vec<f64>> = match &refinement.more {
             More::Nothing => vec![vec![]],
             More::Numbers(numbers) => numbers.iter().map(|v| vec![v.ln()]).collect(),
@@ -144,6 +157,10 @@ pub(crate) fn derived(
                 .iter()
                 .map(|v| vec![(v * problem.data.sample_time).ln()])
                 .collect(),
+            More::Travel(shares) => {
+                let size = travel(problem, &best.fit, best.fit.structure.effects.len() - 1);
+                shares.iter().map(|v| vec![(v * size).ln()]).collect()
+            }
             More::Breakaway => {
                 let speed = speed_scale(problem, &best.fit, best.fit.structure.effects.len() - 1);
                 [0.05, 0.3]
@@ -171,4 +188,76 @@ pub(crate) fn derived(
             fit,
         })
         .collect()
+}
+
+/// Laws whose state decides within a sample interval.
+const QUICK: &[&str] = &[
+    "coulomb_friction",
+    "stribeck_friction",
+    "hysteresis",
+    "end_stop",
+];
+
+/// Whether the newest law of `fit` is one of them.
+pub(crate) fn decides_within(fit: &Fit) -> bool {
+    newest(fit).is_some_and(|d| QUICK.contains(&d.id))
+}
+
+/// Fits that are tried with finer steps.
+const FINER_EACH: usize = 6;
+
+/// The best fits of laws that decide within an interval, at finer steps: one a form of a law, and the forms that were
+/// out of the running at the coarse step.
+pub(crate) fn finer_steps(
+    problem: &Problem,
+    ranked: &[Ranked],
+    base: f64,
+    allowed: &(dyn Fn(&Definition) -> bool + Sync),
+) -> Vec<Ranked> {
+    let count = problem.count();
+    let mut best: Vec<&Ranked> = ranked.iter().collect();
+    best.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let Some(least) = best.first().map(|r| r.criterion) else {
+        return Vec::new();
+    };
+    let reach = least + (IN_THE_RUNNING * (base - least)).max(NEEDED);
+    let mut chosen: Vec<&Ranked> = Vec::new();
+    for r in best {
+        let Some(definition) = newest(&r.fit) else {
+            continue;
+        };
+        let known = |c: &&Ranked| newest(&c.fit).is_some_and(|d| std::ptr::eq(d, definition));
+        if r.criterion <= reach
+            && QUICK.contains(&definition.id)
+            && chosen.len() < FINER_EACH
+            && !chosen.iter().any(known)
+        {
+            chosen.push(r);
+        }
+    }
+    let mut finer: Vec<Ranked> = chosen
+        .into_par_iter()
+        .filter_map(|r| {
+            let structure = Structure {
+                substeps: super::finer::STEPS,
+                ..r.fit.structure.clone()
+            };
+            let fit = Fit::run(
+                problem,
+                structure,
+                r.fit.theta.clone(),
+                Some(&r.fit.noise),
+                Effort::RANK,
+            )?;
+            Some(Ranked {
+                criterion: fit.criterion(count),
+                fit,
+            })
+        })
+        .collect();
+    for refinements in [FINE_REFINEMENTS, REFINEMENTS, FURTHER] {
+        let more = derived(problem, refinements, &finer, base, allowed);
+        finer.extend(more);
+    }
+    finer
 }

@@ -1,9 +1,11 @@
 //! What comes after the best single effect: confirmation on held-out blocks, a second effect, a feedthrough.
 
+use rayon::prelude::*;
+
 use super::data::Series;
 use super::effects::Definition;
 use super::fit::{Effort, Fit, Problem};
-use super::inquiry::penalty;
+use super::inquiry::{penalty, polished};
 use super::plausible::sane;
 use super::refine::{REFINEMENTS, derived};
 use super::search::{Ranked, second_effects};
@@ -48,15 +50,30 @@ pub(crate) fn pair(
     for r in &mut found {
         r.criterion += penalty(r, base, count);
     }
-    let found = found
-        .into_iter()
-        .filter(|r| {
-            !look_alikes(
-                r.fit.structure.new_effects()[0].definition.id,
-                r.fit.structure.new_effects()[1].definition.id,
-            )
+    found.retain(|r| {
+        let effects = r.fit.structure.new_effects();
+        !look_alikes(effects[0].definition.id, effects[1].definition.id) && sane(problem, &r.fit)
+    });
+    found.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    // The best pairs are close to one another, and not fitted to the end: the best of each first effect is.
+    let mut finalists: Vec<Ranked> = Vec::new();
+    for r in found {
+        let first = |r: &Ranked| r.fit.structure.new_effects()[0].definition.id;
+        if finalists.iter().all(|f| first(f) != first(&r)) {
+            finalists.push(r);
+        }
+    }
+    let found = finalists
+        .into_par_iter()
+        .map(|r| {
+            let mut better = Ranked {
+                fit: polished(problem, &r.fit),
+                criterion: 0.0,
+            };
+            better.criterion = better.fit.criterion(count);
+            better.criterion += penalty(&better, base, count);
+            better
         })
-        .filter(|r| sane(problem, &r.fit))
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
     let gain = best.criterion - found.criterion;
     let enough = gain > SECOND_GAIN.max(SECOND_SHARE * single_gain);

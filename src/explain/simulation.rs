@@ -378,6 +378,7 @@ fn learn_nonlinear(
         plant_free: false,
         initial_free: false,
         feedthrough_free: false,
+        substeps: 1,
         initial,
         known: (0..fitted.effects.len())
             .map(|i| fitted.effect_numbers(&best.theta, i).to_vec())
@@ -429,6 +430,7 @@ fn bare(plant: &Plant, initial: &[Vec<f64>]) -> Structure {
         initial_free: false,
         initial,
         feedthrough_free: false,
+        substeps: 1,
         effects: Vec::new(),
         known: Vec::new(),
         adjusted: 0,

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use super::coordinates::{Coordinates, Derivatives};
 use super::data::{Data, Segment, Series};
 use super::effects::{Action, Clock, Definition};
+use super::finer::Finer;
 use super::functionals::{Functionals, dot, matched_sign};
 use super::plant::Plant;
 use super::run::{ActiveForce, run};
@@ -94,6 +95,8 @@ pub(crate) struct Structure {
     pub initial: Vec<Vec<f64>>,
     /// The direct feedthrough is free (it then is of the plant's numbers, so the plant must be free too).
     pub feedthrough_free: bool,
+    /// Steps of the recursion in a sample interval, more than one where a law decides within it (see `finer`).
+    pub substeps: usize,
     /// All effects; the first `known.len()` of them are in the simulation already.
     pub effects: Vec<Instance>,
     /// Numbers of the effects that the simulation knows; they are free when the plant is.
@@ -309,6 +312,7 @@ impl Structure {
     /// Simulated outputs of all segments; `None` when they leave any sensible range.
     pub fn simulate(&self, theta: &[f64], data: &Data) -> Option<Series> {
         let plant = self.plant(theta);
+        let finer = self.finer(&plant);
         let prepared = self.prepare(theta, &plant);
         let mut outputs = Vec::with_capacity(data.segments.len() * data.outputs);
         for (index, segment) in data.segments.iter().enumerate() {
@@ -318,7 +322,9 @@ impl Structure {
                 fresh: false,
             };
             let x0 = self.initial_state(theta, index);
-            outputs.extend(self.simulate_segment(theta, &plant, &prepared, segment, x0, &clock)?);
+            outputs.extend(
+                self.simulate_segment(theta, &plant, &finer, &prepared, segment, x0, &clock)?,
+            );
         }
         Some(outputs)
     }
@@ -332,13 +338,20 @@ impl Structure {
         x0: &[f64],
     ) -> Option<Series> {
         let plant = self.plant(theta);
+        let finer = self.finer(&plant);
         let prepared = self.prepare(theta, &plant);
         let clock = Clock {
             start: segment.start_time,
             step: sample_time,
             fresh: true,
         };
-        self.simulate_segment(theta, &plant, &prepared, segment, x0, &clock)
+        self.simulate_segment(theta, &plant, &finer, &prepared, segment, x0, &clock)
+    }
+
+    fn finer(&self, plant: &Plant) -> Option<Finer> {
+        (self.substeps > 1)
+            .then(|| Finer::new(plant, self.substeps))
+            .flatten()
     }
 
     pub fn prepare(&self, theta: &[f64], plant: &Plant) -> Vec<ActiveForce> {
@@ -398,10 +411,15 @@ impl Structure {
         )
     }
 
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "what is prepared once for all segments"
+    )]
     fn simulate_segment(
         &self,
         theta: &[f64],
         plant: &Plant,
+        finer: &Option<Finer>,
         forces: &[ActiveForce],
         segment: &Segment,
         x0: &[f64],
@@ -421,7 +439,11 @@ impl Structure {
             with_paths = Cow::Owned(with_moments(&with_paths));
             inputs.to_mut().extend(moments);
         }
-        let mut outputs = run(&with_paths, forces, x0, &inputs, segment.samples(), clock)?;
+        let samples = segment.samples();
+        let mut outputs = match finer {
+            Some(finer) => finer.run(&with_paths, forces, x0, &inputs, samples, clock)?,
+            None => run(&with_paths, forces, x0, &inputs, samples, clock)?,
+        };
         for (index, effect) in self.effects.iter().enumerate() {
             if matches!(effect.definition.action, Action::Mode) {
                 let residues =

@@ -206,6 +206,13 @@ impl Definition {
             .is_some_and(|p| matches!(p.name, "delay" | "time_constant" | "width" | "half_gap"))
     }
 
+    /// Whether it begins at some time in the recording.
+    pub(crate) fn changes(&self) -> bool {
+        self.parameters
+            .iter()
+            .any(|p| p.name == "from" && p.unit == Unit::Second)
+    }
+
     /// Where the effect acts.
     pub fn port(&self) -> Port {
         match self.action {

@@ -1,0 +1,133 @@
+//! The recursion at a finer step than the samples, for laws whose state decides within an interval.
+//!
+//! Dry friction on a quick plant reverses within a sample: at the recording's step its sign is decided once an
+//! interval, which is another force. The plant between samples follows from its own matrix: with `A_s^m = A` and
+//! `(I + A_s + .. + A_s^(m-1)) B_s = B`, `m` steps of `(A_s, B_s)` at a held input are one of `(A, B)`.
+
+use nalgebra::DMatrix;
+
+use super::data::Series;
+use super::effects::Clock;
+use super::plant::{Plant, row_major};
+use super::run::{ActiveForce, run};
+
+/// Steps a sample that a law is tried with; the error of a step falls with its square, so this takes out most of it.
+pub(crate) const STEPS: usize = 4;
+/// Most that a document may ask for.
+pub(crate) const MOST_STEPS: usize = 64;
+
+/// A plant's matrix between samples.
+#[derive(Debug, Clone)]
+pub(crate) struct Finer {
+    steps: usize,
+    /// `A_s`.
+    a: DMatrix<f64>,
+    /// `(I + A_s + .. + A_s^(m-1))^-1`.
+    share: DMatrix<f64>,
+}
+
+impl Finer {
+    /// `steps` steps a sample; `None` where the plant has no continuous equivalent (a pole on the negative real axis).
+    pub fn new(plant: &Plant, steps: usize) -> Option<Self> {
+        let n = plant.states;
+        let log = crate::linalg::logarithm(&plant.a_matrix())?;
+        let a = crate::linalg::exponential(&(log / steps as f64));
+        let mut sum = DMatrix::identity(n, n);
+        let mut power = DMatrix::identity(n, n);
+        for _ in 1..steps {
+            power = &a * power;
+            sum += &power;
+        }
+        Some(Self {
+            steps,
+            a,
+            share: sum.try_inverse()?,
+        })
+    }
+
+    /// As [`run`] of `plant`, whose state matrix this was made of.
+    pub fn run(
+        &self,
+        plant: &Plant,
+        forces: &[ActiveForce],
+        x0: &[f64],
+        inputs: &[Vec<f64>],
+        samples: usize,
+        clock: &Clock,
+    ) -> Option<Series> {
+        let m = self.steps;
+        let fine = Plant {
+            a: row_major(&self.a),
+            b: row_major(&(&self.share * plant.b_matrix())),
+            sample_time: plant.sample_time / m as f64,
+            ..plant.clone()
+        };
+        let forces: Vec<ActiveForce> = forces.iter().map(|force| self.force(force)).collect();
+        let held: Vec<Vec<f64>> = inputs
+            .iter()
+            .map(|u| u.iter().flat_map(|u| std::iter::repeat_n(*u, m)).collect())
+            .collect();
+        let clock = Clock {
+            step: clock.step / m as f64,
+            ..*clock
+        };
+        let outputs = run(&fine, &forces, x0, &held, samples * m, &clock)?;
+        Some(
+            outputs
+                .into_iter()
+                .map(|y| y.into_iter().step_by(m).collect())
+                .collect(),
+        )
+    }
+
+    /// A force through its share of the direction.
+    fn force(&self, force: &ActiveForce) -> ActiveForce {
+        let n = force.direction.len();
+        let direction: Vec<f64> = (0..n)
+            .map(|i| {
+                (0..n)
+                    .map(|j| self.share[(i, j)] * force.direction[j])
+                    .sum()
+            })
+            .collect();
+        ActiveForce {
+            rate_gain: force.rate.iter().zip(&direction).map(|(r, b)| r * b).sum(),
+            direction,
+            ..force.clone()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Without forces that depend on the motion, fine steps change nothing at the samples.
+    #[test]
+    fn held_inputs_give_the_same_samples() {
+        let plant = Plant {
+            states: 2,
+            inputs: 1,
+            outputs: 1,
+            a: vec![0.9, 0.2, -0.3, 0.8],
+            b: vec![0.1, 0.5],
+            c: vec![1.0, 0.3],
+            d: vec![0.0],
+            sample_time: 0.01,
+        };
+        let input = vec![(0..200).map(|k| f64::from(k).sin()).collect::<Vec<f64>>()];
+        let clock = Clock {
+            start: 0.0,
+            step: 0.01,
+            fresh: false,
+        };
+        let coarse = run(&plant, &[], &[0.3, -0.1], &input, 200, &clock).unwrap();
+        let finer = Finer::new(&plant, 4).unwrap();
+        let fine = finer
+            .run(&plant, &[], &[0.3, -0.1], &input, 200, &clock)
+            .unwrap();
+        for (a, b) in coarse[0].iter().zip(&fine[0]) {
+            assert!((a - b).abs() < 1e-12, "{a} {b}");
+        }
+    }
+}
