@@ -26,6 +26,7 @@ mod adequacy;
 mod answer;
 mod augmented;
 mod baseline;
+mod cascade;
 mod coordinates;
 mod curve;
 mod data;
@@ -43,13 +44,16 @@ mod plausible;
 mod probability;
 mod prove;
 mod rebaseline;
+mod rectified;
 mod refine;
 mod run;
 mod screen;
 mod search;
 mod second;
 mod simulation;
+mod start;
 mod structure;
+mod tanks;
 mod templates;
 mod words;
 
@@ -59,6 +63,7 @@ pub use error::ExplainError;
 pub use explanation::{
     Alternative, AugmentedModel, Curve, Detectable, EXPLANATION_FORMAT, EffectFound, EffectSize,
     Evidence, Explanation, FitFigure, FitSteps, FitTable, Location, ModelEffect, NoiseFound,
-    ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces, Verdict,
+    ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces, StatePrior,
+    Verdict,
 };
 pub use simulation::Simulation;

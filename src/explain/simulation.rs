@@ -9,7 +9,7 @@ use super::effects::{Action, Definition};
 use super::error::ExplainError;
 use super::fit::{Effort, Fit, Problem};
 use super::plant::Plant;
-use super::rebaseline::{rebaseline, shifted};
+use super::rebaseline::{MOST_DELAY, rebaseline, shifted};
 use super::run::MOST_STATES;
 use super::search::{Boring, single_effects};
 use super::structure::Structure;
@@ -159,7 +159,13 @@ fn of_model(recordings: &[Log], model: &Model, name: &str) -> Result<Known, Expl
         }
         plain.inputs += 1;
         plain.constant = true;
-        if let Some((plant, delay)) = rebaseline(&plain) {
+        // A delay of the wrong law helps no other: where the sign may be lost, none is put before everything.
+        let most_delay = if super::rectified::applies(&plain) {
+            0
+        } else {
+            MOST_DELAY
+        };
+        if let Some((plant, delay)) = rebaseline(&plain, most_delay) {
             let data = shifted(&plain, delay);
             if let Some((initial, _)) = super::baseline::initial_states(&plant, &data) {
                 return Ok(Known {
@@ -414,7 +420,7 @@ fn learn_nonlinear(
 }
 
 /// A plant without effects in minimal coordinates.
-fn bare(plant: &Plant, initial: &[Vec<f64>]) -> Structure {
+pub(crate) fn bare(plant: &Plant, initial: &[Vec<f64>]) -> Structure {
     let coordinates = Arc::new(Coordinates::new(plant));
     let initial = initial
         .iter()

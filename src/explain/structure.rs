@@ -141,6 +141,13 @@ impl Structure {
         &self.effects[self.first_new()..]
     }
 
+    /// Whether the plant is tanks: the linear plant is then only what they do near their mean levels.
+    pub fn is_tanks(&self) -> bool {
+        self.effects
+            .iter()
+            .any(|e| matches!(e.definition.action, Action::Process))
+    }
+
     /// Effects whose numbers are in the parameter vector.
     fn free_effects(&self) -> std::ops::Range<usize> {
         (if self.plant_free { 0 } else { self.known.len() })..self.effects.len()
@@ -419,7 +426,11 @@ impl Structure {
             with_paths = Cow::Owned(with_moments(&with_paths));
             inputs.to_mut().extend(moments);
         }
-        let mut outputs = run(&with_paths, forces, x0, &inputs, segment.samples(), clock)?;
+        let mut outputs = if self.is_tanks() {
+            super::tanks::simulate(self, theta, &inputs, x0, clock)?
+        } else {
+            run(&with_paths, forces, x0, &inputs, segment.samples(), clock)?
+        };
         for (index, effect) in self.effects.iter().enumerate() {
             if matches!(effect.definition.action, Action::Mode) {
                 let residues =
