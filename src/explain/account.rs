@@ -336,6 +336,12 @@ impl Answer<'_> {
         } else {
             boring
         };
+        // What is no adjustment of the simulation's plant, but another one, has nothing to compare with.
+        let simulated = &self.known.structure.coordinates;
+        let model = &self.finding.model.structure.coordinates;
+        if !std::sync::Arc::ptr_eq(model, simulated) {
+            return Vec::new();
+        }
         if !fit.structure.plant_free {
             return self.adjustments(fit);
         }

@@ -11,15 +11,16 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `simulation`, `baseline`, `rebaseline` | the simulation as a model, also from a column of its outputs |
+//! | `simulation`, `baseline`, `offset`, `rebaseline` | the simulation as a model, also from a column of its outputs |
 //! | `coordinates`, `plant`, `structure`, `run` | the augmented model: numbers, effects, the recursion |
 //! | `effects` | the library, one file a family |
 //! | `noise`, `fit` | coloured, heavy-tailed noise; Levenberg and Marquardt |
 //! | `screen`, `templates`, `features` | one Gauss-Newton step for everything |
+//! | `cascade`, `tanks`, `rectified` | plants of another class, which no effect added to the linear one becomes |
 //! | `search`, `refine`, `plausible`, `second`, `inquiry` | the fits, what is kept of them, the decision |
 //! | `exact`, `adequacy` | tests without fits, and of what is left |
 //! | `locate`, `curve`, `prove`, `probability` | where, the law without a form, held-out blocks, how sure |
-//! | `answer`, `account`, `words`, `explanation`, `augmented` | what is said, and the model that can be run |
+//! | `answer`, `account`, `words`, `explanation`, `augmented`, `start` | what is said, and the model that can be run |
 
 mod account;
 mod adequacy;
@@ -39,6 +40,7 @@ mod fit;
 mod inquiry;
 mod locate;
 mod noise;
+mod offset;
 mod plant;
 mod plausible;
 mod probability;

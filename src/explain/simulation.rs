@@ -8,6 +8,7 @@ use super::data::{Data, Segment, Series};
 use super::effects::{Action, Definition};
 use super::error::ExplainError;
 use super::fit::{Effort, Fit, Problem};
+use super::offset::operating_point;
 use super::plant::Plant;
 use super::rebaseline::{MOST_DELAY, rebaseline, shifted};
 use super::run::MOST_STATES;
@@ -341,9 +342,35 @@ fn of_outputs(recordings: &[Log], logs: &[Log]) -> Result<Known, ExplainError> {
             relative: false,
         });
     }
+    if let Some(known) = about_a_level(&data, &noise_free, &delays) {
+        return Ok(known);
+    }
     learn_nonlinear(data, &noise_free, &structure, &simulator).ok_or(ExplainError::NotUnderstood {
         name: name(),
         misfit: simulator.misfit,
+    })
+}
+
+/// A simulator that is linear about an operating point.
+fn about_a_level(data: &Data, noise_free: &Data, delays: &[usize]) -> Option<Known> {
+    let level = operating_point(noise_free)?;
+    let mut about = noise_free.clone();
+    for segment in &mut about.segments {
+        for (y, level) in segment.outputs.iter_mut().zip(&level) {
+            for y in y {
+                *y -= level;
+            }
+        }
+    }
+    let mut simulator = identify_simulator(&about).filter(Simulator::is_linear)?;
+    let mut data = data.clone();
+    let rest = vec![0.0; data.inputs];
+    add_constant(&mut data, &mut simulator.plant, &rest, &level);
+    Some(Known {
+        structure: bare(&simulator.plant, &simulator.initial),
+        data,
+        delays: delays.to_vec(),
+        relative: false,
     })
 }
 

@@ -13,7 +13,6 @@ use super::data::{Data, Series};
 use super::effects::{self, Action, Clock, Definition};
 use super::explanation::StatePrior;
 use super::fit::{Effort, Fit, Problem};
-use super::inquiry::NEEDED;
 use super::plant::Plant;
 use super::search::Ranked;
 use super::structure::{Direction, Instance, Signal, Structure};
@@ -151,10 +150,8 @@ pub(crate) fn candidates(
     let Some(found) = cascade::fit(&records, &problem.mask) else {
         return Vec::new();
     };
-    // The criterion of the class takes its errors for white: its losses are worth what their independent samples are.
-    let worth = found.effective / problem.count().max(1) as f64;
-    if found.losses.outflow * worth < NEEDED || found.cascade.parts.pump_bias && idles(data, &found)
-    {
+    // Where outflows in proportion to the levels do as well, nothing speaks for tanks.
+    if found.losses.outflow <= 0.0 || found.cascade.parts.pump_bias && idles(data, &found) {
         return Vec::new();
     }
     let count = problem.count();

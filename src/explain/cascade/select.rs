@@ -17,6 +17,8 @@ const UNEXPLAINED: f64 = 0.5;
 /// Starts of the full class from the grid, and of every other.
 const STARTS: usize = 6;
 const FEWER_STARTS: usize = 2;
+/// Share of the time below the upper rim at a second start of the full class.
+const OFTEN_FULL: f64 = 0.5;
 /// Steps by which starts are told apart, and steps to arrive.
 const SCOUT: usize = 12;
 const ARRIVE: usize = 80;
@@ -157,6 +159,14 @@ fn select(problem: &Problem, pump_bias: bool) -> Option<(Trial, Losses)> {
             .take(from_grid)
             .map(|t| problem.furnished(t, parts, BELOW_UPPER_RIM))
             .collect();
+        if fits.is_empty() {
+            // A tank that is full most of the time is not found from one that seldom is.
+            starts.extend(
+                grid.iter()
+                    .take(from_grid)
+                    .map(|t| problem.furnished(t, parts, OFTEN_FULL)),
+            );
+        }
         let fuller = fits.iter().filter(|f| parts.within(f.cascade.parts));
         starts.extend(fuller.map(|f| problem.furnished(f, parts, BELOW_UPPER_RIM)));
         fits.extend(arrive(problem, starts));
