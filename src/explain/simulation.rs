@@ -166,7 +166,15 @@ fn of_model(recordings: &[Log], model: &Model, name: &str) -> Result<Known, Expl
         } else {
             MOST_DELAY
         };
-        if let Some((plant, delay)) = rebaseline(&plain, most_delay) {
+        let mut found = rebaseline(&plain, most_delay);
+        if let Some((plant, delay)) = &found
+            && *delay > 0
+            && super::baseline::initial_states(plant, &shifted(&plain, *delay))
+                .is_some_and(|(_, missed)| super::tanks::miss_less(&plain, missed))
+        {
+            found = rebaseline(&plain, 0);
+        }
+        if let Some((plant, delay)) = found {
             let data = shifted(&plain, delay);
             if let Some((initial, _)) = super::baseline::initial_states(&plant, &data) {
                 return Ok(Known {

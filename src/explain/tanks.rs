@@ -142,12 +142,7 @@ pub(crate) fn candidates(
     if data.signals() != 1 || data.outputs != 1 || !given.known.is_empty() {
         return Vec::new();
     }
-    let records: Vec<(&[f64], &[f64])> = data
-        .segments
-        .iter()
-        .map(|s| (s.inputs[0].as_slice(), s.outputs[0].as_slice()))
-        .collect();
-    let Some(found) = cascade::fit(&records, &problem.mask) else {
+    let Some(found) = found(problem) else {
         return Vec::new();
     };
     // Where outflows in proportion to the levels do as well, nothing speaks for tanks.
@@ -178,6 +173,25 @@ pub(crate) fn candidates(
             })
         })
         .collect()
+}
+
+fn found(problem: &Problem) -> Option<CascadeFit> {
+    let records: Vec<(&[f64], &[f64])> = problem
+        .data
+        .segments
+        .iter()
+        .map(|s| (s.inputs[0].as_slice(), s.outputs[0].as_slice()))
+        .collect();
+    cascade::fit(&records, &problem.mask)
+}
+
+/// Whether tanks simulate `data` with less than this share of the deviation of its output missed.
+pub(crate) fn miss_less(data: &Data, share: f64) -> bool {
+    if data.signals() != 1 || data.outputs != 1 {
+        return false;
+    }
+    let problem = Problem::new(data);
+    found(&problem).is_some_and(|fit| fit.error < share * problem.scale[0])
 }
 
 /// Whether the pump stands still in more of the recording than outliers make up. An input that is negative is a command
