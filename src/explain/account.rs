@@ -21,6 +21,7 @@ impl Answer<'_> {
         match effect.definition.port() {
             Port::Input | Port::Path => inputs.get(effect.channel).cloned().unwrap_or_default(),
             Port::Sensor | Port::Exact => outputs.get(effect.channel).cloned().unwrap_or_default(),
+            Port::Process => outputs.first().cloned().unwrap_or_default(),
             Port::Force => match effect.signal {
                 Signal::Output(o) | Signal::Integral(o) => outputs[o].clone(),
                 Signal::Difference(i, j) => format!("{} - {}", outputs[i], outputs[j]),
@@ -214,7 +215,12 @@ impl Answer<'_> {
         let effect = &structure.effects[index];
         let plant = structure.plant(&model.theta);
         let rows = Functionals::new(&plant);
-        let rate = rows.of(&plant, effect.signal).rate;
+        let rate = if effect.definition.variant == "smooth" {
+            // A speed that inputs hold: what holds it against the friction.
+            held(&plant, rows.of(&plant, effect.signal).rate)
+        } else {
+            rows.of(&plant, effect.signal).rate
+        };
         let numbers = structure.effect_numbers(&model.theta, index);
         let offset = structure.effect_offset(index);
         let fixed = !structure.plant_free && index < structure.known.len();
@@ -390,6 +396,12 @@ impl Answer<'_> {
         } else {
             boring
         };
+        // What is no adjustment of the simulation's plant, but another one, has nothing to compare with.
+        let simulated = &self.known.structure.coordinates;
+        let model = &self.finding.model.structure.coordinates;
+        if !std::sync::Arc::ptr_eq(model, simulated) {
+            return Vec::new();
+        }
         if !fit.structure.plant_free {
             return self.adjustments(fit);
         }
@@ -494,11 +506,22 @@ impl Answer<'_> {
     }
 }
 
+/// `row (I - A)^-1`: a row of the state under a constant push.
+fn held(plant: &super::plant::Plant, row: Vec<f64>) -> Vec<f64> {
+    let n = plant.states;
+    let Some(inverse) = (nalgebra::DMatrix::identity(n, n) - plant.a_matrix()).try_inverse() else {
+        return row;
+    };
+    let held = nalgebra::RowDVector::from_row_slice(&row) * inverse;
+    held.iter().copied().collect()
+}
+
 fn port_name(port: Port) -> &'static str {
     match port {
         Port::Input => "input",
         Port::Force => "force",
         Port::Sensor | Port::Exact => "sensor",
         Port::Path => "path",
+        Port::Process => "process",
     }
 }

@@ -128,6 +128,7 @@ impl Answer<'_> {
             &self.known.delays,
             self.data().constant,
         );
+        augmented.initial_state_prior = super::tanks::prior(self.data(), model);
         if self.known.relative {
             augmented.reference = Some(Box::new(AugmentedModel::describe(
                 &self.known.structure,
@@ -337,7 +338,7 @@ impl Answer<'_> {
         let port = (!model.structure.new_effects().is_empty()).then(|| {
             match model.structure.new_effects()[0].definition.port() {
                 Port::Input | Port::Path => "input",
-                Port::Force => "inside",
+                Port::Force | Port::Process => "inside",
                 Port::Sensor | Port::Exact => "output",
             }
             .to_owned()

@@ -15,11 +15,6 @@ use super::structure::{Direction, Instance, Signal, Structure};
 use crate::log::Channel;
 use crate::report::Rows;
 
-/// Samples that an initial state is estimated from, at most.
-const INITIAL_SAMPLES: usize = 2000;
-/// Weight of the prior of an initial state: one sample's worth.
-const PRIOR: f64 = 1e-4;
-
 /// Why an augmented model cannot be run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -104,8 +99,16 @@ impl AugmentedModel {
                 .collect(),
             effects,
             substeps: structure.substeps,
+            initial_state_prior: None,
             reference: None,
         }
+    }
+
+    /// The state that is meant where none is given: the operating point.
+    pub(super) fn rest(&self) -> Vec<f64> {
+        self.initial_state_prior
+            .as_ref()
+            .map_or_else(|| vec![0.0; self.a.0.nrows()], |prior| prior.mean.clone())
     }
 
     /// Outputs on a new input (`inputs[channel][sample]`, in the units of the recording), from rest or from `initial`.
@@ -140,86 +143,7 @@ impl AugmentedModel {
         Ok(outputs)
     }
 
-    /// The initial state with which the model reproduces the first samples of `outputs` best, by a few steps of Gauss
-    /// and Newton from rest. Spread and level of the states on the recording are the prior (maximum a posteriori), so
-    /// that directions which few samples do not determine stay sensible.
-    ///
-    /// # Errors
-    /// As [`AugmentedModel::simulate`].
-    pub fn estimate_initial_state(
-        &self,
-        inputs: &[&[f64]],
-        outputs: &[&[f64]],
-    ) -> Result<Vec<f64>, AugmentedError> {
-        let samples = inputs.first().map_or(0, |u| u.len()).min(INITIAL_SAMPLES);
-        let inputs: Vec<&[f64]> = inputs.iter().map(|u| &u[..samples]).collect();
-        let n = self.a.0.nrows();
-        let l = self.outputs.len();
-        let scale: Vec<f64> = (0..l)
-            .map(|o| {
-                let y = &outputs[o][..samples];
-                let mean = y.iter().sum::<f64>() / samples.max(1) as f64;
-                (y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / samples.max(1) as f64)
-                    .sqrt()
-                    .max(1e-12)
-            })
-            .collect();
-        let error = |x: &[f64]| -> Result<Vec<f64>, AugmentedError> {
-            let y = self.run(&inputs, Some(x))?;
-            Ok((0..l)
-                .flat_map(|o| (0..samples).map(move |k| (o, k)))
-                .map(|(o, k)| (outputs[o][k] - y[o][k]) / scale[o])
-                .collect())
-        };
-        let spread = 3.0 * scale.iter().copied().fold(0.0, f64::max);
-        let mut x = vec![0.0; n];
-        let mut e = error(&x)?;
-        let cost = |e: &[f64], x: &[f64]| -> f64 {
-            e.iter().map(|v| v * v).sum::<f64>()
-                + PRIOR * x.iter().map(|v| (v / spread).powi(2)).sum::<f64>()
-        };
-        let mut damping = 1e-3;
-        for _ in 0..40 {
-            let step = 1e-6 * spread;
-            let mut columns = DMatrix::zeros(e.len(), n);
-            for i in 0..n {
-                let mut moved = x.clone();
-                moved[i] += step;
-                let ahead = error(&moved)?;
-                for (row, (a, b)) in ahead.iter().zip(&e).enumerate() {
-                    columns[(row, i)] = (b - a) / step;
-                }
-            }
-            let mut gram = columns.tr_mul(&columns);
-            let mut right = columns.tr_mul(&nalgebra::DVector::from_column_slice(&e));
-            for i in 0..n {
-                gram[(i, i)] = gram[(i, i)] * (1.0 + damping) + PRIOR / (spread * spread);
-                right[i] -= PRIOR * x[i] / (spread * spread);
-            }
-            let Some(solved) = gram.cholesky().map(|c| c.solve(&right)) else {
-                break;
-            };
-            let trial: Vec<f64> = x.iter().zip(solved.iter()).map(|(a, b)| a + b).collect();
-            match error(&trial) {
-                Ok(now) if cost(&now, &trial) < cost(&e, &x) => {
-                    let settled = cost(&e, &x) - cost(&now, &trial) < 1e-9 * cost(&e, &x);
-                    x = trial;
-                    e = now;
-                    damping *= 0.2;
-                    if settled {
-                        break;
-                    }
-                }
-                _ => damping = (damping * 10.0).max(1e-6),
-            }
-            if damping > 1e9 {
-                break;
-            }
-        }
-        Ok(x)
-    }
-
-    fn run(
+    pub(super) fn run(
         &self,
         inputs: &[&[f64]],
         initial: Option<&[f64]>,
@@ -246,7 +170,7 @@ impl AugmentedModel {
             outputs: Vec::new(),
             start_time: 0.0,
         };
-        let rest = vec![0.0; structure.states()];
+        let rest = self.rest();
         structure
             .simulate_fresh(&[], &segment, self.sample_time, initial.unwrap_or(&rest))
             .ok_or(AugmentedError::Diverges)
@@ -288,6 +212,11 @@ impl AugmentedModel {
         if !(self.sample_time.is_finite() && self.sample_time > 0.0) {
             return Err(damaged("the sample time is not positive"));
         }
+        if let Some(prior) = &self.initial_state_prior
+            && (prior.mean.len() != n || prior.mean.iter().any(|v| !v.is_finite()))
+        {
+            return Err(damaged("the prior of the initial state does not fit A"));
+        }
         let plant = Plant {
             states: n,
             inputs: r,
@@ -318,6 +247,9 @@ impl AugmentedModel {
                 signal,
                 direction: Direction::Free,
             };
+            if matches!(definition.action, Action::Process) && (l != 1 || !(1..=2).contains(&n)) {
+                return Err(damaged("tanks have one or two levels and one output"));
+            }
             let on_output = matches!(definition.action, Action::Sensor(_));
             let channels = if on_output { l } else { r };
             if places.iter().any(|o| *o >= l) || effect.channel >= channels {

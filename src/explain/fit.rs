@@ -94,6 +94,19 @@ impl<'a> Problem<'a> {
         (sum / n.max(1) as f64).sqrt()
     }
 
+    /// Mean square of a residual over the values that count, in variances of the outputs.
+    pub fn mean_square(&self, residual: &Series) -> f64 {
+        let (mut sum, mut n) = (0.0, 0usize);
+        for (s, (residual, mask)) in residual.iter().zip(&self.mask).enumerate() {
+            let scale = self.scale[s % self.scale.len()];
+            for (e, _) in residual.iter().zip(mask).filter(|(_, keep)| **keep) {
+                sum += (e / scale).powi(2);
+                n += 1;
+            }
+        }
+        sum / n.max(1) as f64
+    }
+
     /// Noise model of a residual.
     pub fn noise(&self, residual: &Series) -> Noise {
         Noise::estimate(residual, self.data.outputs, &self.mask, self.noise_order)

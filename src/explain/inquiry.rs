@@ -133,6 +133,9 @@ pub(crate) fn inquire(
     add_free_twins(&problem, &finding.boring, &mut ranked, base);
     let mut ranked_all = ranked.clone();
     ranked.retain(|r| plant_may_stay(r, &ranked_all));
+    // Plants of other classes, which no effect added to the linear one becomes.
+    ranked.extend(super::tanks::candidates(&problem, structure, allowed));
+    ranked.extend(super::rectified::candidates(&problem, structure, allowed));
     ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     finding.rivals = rivals(&ranked, base);
     finding.detectable = detectable(&problem, &ranked);
@@ -141,7 +144,7 @@ pub(crate) fn inquire(
     // (beside a plant as given the gain is one over that plant: over a free one it is mostly fewer numbers).
     let best = ranked.iter().take(4).find(|r| {
         let gain = base - r.criterion;
-        let before = if r.fit.structure.plant_free {
+        let before = if r.fit.structure.plant_free || r.fit.structure.is_tanks() {
             finding.boring.best(count)
         } else {
             &finding.boring.near
@@ -156,7 +159,14 @@ pub(crate) fn inquire(
             && (r.fit.structure.plant_free || r.fit.deviance < finding.boring.full.deviance)
     });
     if let Some(best) = best {
-        let mut fit = polished(&problem, &best.fit);
+        // A plant of another class has been searched with everything that comes with it, and to the end.
+        let other_class =
+            best.fit.structure.is_tanks() || best.fit.structure.new_effects().len() > 1;
+        let mut fit = if other_class {
+            best.fit.clone()
+        } else {
+            polished(&problem, &best.fit)
+        };
         if let Some(direct) = with_feedthrough(&problem, &fit) {
             fit = direct;
             ranked_all.push(Ranked {
@@ -168,7 +178,7 @@ pub(crate) fn inquire(
         // Where nothing is left there is no second effect to find.
         let nothing_left = adequacy(&problem, &fit, &finding.boring.given, None)
             .is_some_and(|a| a.p_value > NOTHING_LEFT);
-        let second = if nothing_left {
+        let second = if nothing_left || other_class {
             None
         } else {
             pair(&problem, &ranked_all, base, allowed)
@@ -184,6 +194,11 @@ pub(crate) fn inquire(
             &finding.boring.given,
             Some(finding.boring.best(count)),
         );
+        if other_class {
+            let before = problem.mean_square(&finding.boring.best(count).residual);
+            let now = problem.mean_square(&fit.residual);
+            finding.adequacy = finding.adequacy.map(|a| a.of_class(before, now));
+        }
         finding.augmented = Some(fit.clone());
         let holds = finding.adequacy.is_none_or(|a| a.holds());
         finding.verdict = if !holds {
@@ -284,7 +299,7 @@ fn detectable(
     let mut list: Vec<(&'static Definition, super::structure::Instance, f64)> = Vec::new();
     for r in ranked {
         let instance = r.fit.structure.new_effects()[0];
-        if list.iter().any(|l| l.0.id == instance.definition.id) {
+        if r.fit.structure.is_tanks() || list.iter().any(|l| l.0.id == instance.definition.id) {
             continue;
         }
         // The same numbers without the effect.

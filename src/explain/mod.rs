@@ -11,21 +11,23 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `simulation`, `baseline`, `rebaseline` | the simulation as a model, also from a column of its outputs |
+//! | `simulation`, `baseline`, `offset`, `rebaseline` | the simulation as a model, also from a column of its outputs |
 //! | `coordinates`, `plant`, `structure`, `functionals`, `run`, `finer` | the augmented model: numbers, effects, the recursion |
 //! | `effects` | the library, one file a family |
 //! | `noise`, `fit` | coloured, heavy-tailed noise; Levenberg and Marquardt |
 //! | `screen`, `templates`, `features` | one Gauss-Newton step for everything |
+//! | `cascade`, `tanks`, `rectified` | plants of another class, which no effect added to the linear one becomes |
 //! | `search`, `refine`, `plausible`, `second`, `inquiry` | the fits, what is kept of them, the decision |
 //! | `exact`, `adequacy` | tests without fits, and of what is left |
 //! | `locate`, `curve`, `prove`, `probability` | where, the law without a form, held-out blocks, how sure |
-//! | `answer`, `account`, `words`, `explanation`, `augmented` | what is said, and the model that can be run |
+//! | `answer`, `account`, `words`, `explanation`, `augmented`, `start` | what is said, and the model that can be run |
 
 mod account;
 mod adequacy;
 mod answer;
 mod augmented;
 mod baseline;
+mod cascade;
 mod coordinates;
 mod curve;
 mod data;
@@ -40,18 +42,22 @@ mod functionals;
 mod inquiry;
 mod locate;
 mod noise;
+mod offset;
 mod plant;
 mod plausible;
 mod probability;
 mod prove;
 mod rebaseline;
+mod rectified;
 mod refine;
 mod run;
 mod screen;
 mod search;
 mod second;
 mod simulation;
+mod start;
 mod structure;
+mod tanks;
 mod templates;
 mod words;
 
@@ -61,6 +67,7 @@ pub use error::ExplainError;
 pub use explanation::{
     Alternative, AugmentedModel, Curve, Detectable, EXPLANATION_FORMAT, EffectFound, EffectSize,
     Evidence, Explanation, FitFigure, FitSteps, FitTable, Location, ModelEffect, NoiseFound,
-    ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces, Verdict,
+    ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces, StatePrior,
+    Verdict,
 };
 pub use simulation::Simulation;

@@ -15,7 +15,7 @@ use crate::linalg::{eigenvalues, least_squares};
 /// Highest order that is tried.
 const MOST_ORDER: usize = 4;
 /// Longest delay that is tried, in samples beyond the first.
-const MOST_DELAY: usize = 4;
+pub(crate) const MOST_DELAY: usize = 4;
 /// Passes of the iteration.
 const PASSES: usize = 6;
 /// A higher order must lower the simulation error by this share: elbow, since misfit of a plant that is not linear
@@ -25,12 +25,12 @@ const WORTH: f64 = 0.08;
 const INSIDE: f64 = 0.9995;
 
 /// The best baseline of one input (beside the constant) and one output: plant over `[u, 1]`, delay.
-pub(crate) fn rebaseline(data: &Data) -> Option<(Plant, usize)> {
+pub(crate) fn rebaseline(data: &Data, most_delay: usize) -> Option<(Plant, usize)> {
     let mut best: Option<(f64, Plant, usize)> = None;
     for order in 1..=MOST_ORDER {
         let mut own: Option<(f64, Plant, usize)> = None;
-        for delay in 0..=MOST_DELAY {
-            for (error, plant) in of_order(data, order, delay) {
+        for delay in 0..=most_delay {
+            for (error, plant) in of_order(data, order, delay, true) {
                 if own.as_ref().is_none_or(|o| error < o.0 * 0.98) {
                     own = Some((error, plant, delay));
                 }
@@ -44,8 +44,13 @@ pub(crate) fn rebaseline(data: &Data) -> Option<(Plant, usize)> {
     best.map(|(_, plant, delay)| (plant, delay))
 }
 
-/// All passes at one order and delay: `(relative simulation error, plant)`.
-fn of_order(data: &Data, order: usize, delay: usize) -> Vec<(f64, Plant)> {
+/// All passes at one order and delay, with an operating point or about zero: `(relative simulation error, plant)`.
+pub(crate) fn of_order(
+    data: &Data,
+    order: usize,
+    delay: usize,
+    operating_point: bool,
+) -> Vec<(f64, Plant)> {
     let mut found = Vec::new();
     let mut denominator = vec![0.0; order];
     for pass in 0..=PASSES {
@@ -53,6 +58,7 @@ fn of_order(data: &Data, order: usize, delay: usize) -> Vec<(f64, Plant)> {
             data,
             order,
             delay,
+            operating_point,
             if pass == 0 { &[] } else { &denominator },
         ) else {
             break;
@@ -72,6 +78,7 @@ fn regression(
     data: &Data,
     order: usize,
     delay: usize,
+    operating_point: bool,
     filter: &[f64],
 ) -> Option<(Vec<f64>, Vec<f64>, f64)> {
     let first = order + delay + 1;
@@ -83,7 +90,8 @@ fn regression(
     if rows < 6 * (2 * order + 1) {
         return None;
     }
-    let mut m = DMatrix::zeros(rows, 2 * order + 1);
+    let columns = 2 * order + usize::from(operating_point);
+    let mut m = DMatrix::zeros(rows, columns);
     let mut t = DMatrix::zeros(rows, 1);
     let mut row = 0;
     for segment in &data.segments {
@@ -95,7 +103,9 @@ fn regression(
                 m[(row, i)] = -y[k - 1 - i];
                 m[(row, order + i)] = u[k - 1 - delay - i];
             }
-            m[(row, 2 * order)] = one[k];
+            if operating_point {
+                m[(row, 2 * order)] = one[k];
+            }
             t[(row, 0)] = y[k];
             row += 1;
         }
@@ -105,7 +115,11 @@ fn regression(
         (
             (0..order).map(|i| c[(i, 0)]).collect(),
             (0..order).map(|i| c[(order + i, 0)]).collect(),
-            c[(2 * order, 0)],
+            if operating_point {
+                c[(2 * order, 0)]
+            } else {
+                0.0
+            },
         )
     })
 }

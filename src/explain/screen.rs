@@ -44,6 +44,8 @@ pub(crate) struct Bench<'a> {
     pub nuisance: DMatrix<f64>,
     pub nuisance_inverse: DMatrix<f64>,
     pub left: f64,
+    /// What a small change before the sensors is multiplied by, where they do not pass it on as it is.
+    pub slopes: Option<Series>,
 }
 
 /// A place and law with its response: one column a linear coefficient.
@@ -133,6 +135,7 @@ impl<'a> Bench<'a> {
             nuisance: DMatrix::zeros(rows, 0),
             nuisance_inverse: DMatrix::zeros(0, 0),
             left: 0.0,
+            slopes: super::rectified::signs(&basis.structure, &basis.theta, problem.data),
         };
         let mut flat: Vec<f64> = Vec::new();
         let mut count = 0;

@@ -12,10 +12,10 @@ use super::search::{Ranked, second_effects};
 
 /// A second effect must bring this share of what the first brought: misfit of the first breeds false seconds
 /// (math/explain.md, choice 9).
-const SECOND_SHARE: f64 = 0.1;
+pub(crate) const SECOND_SHARE: f64 = 0.1;
 
 /// ... and at least this much.
-const SECOND_GAIN: f64 = 30.0;
+pub(crate) const SECOND_GAIN: f64 = 30.0;
 
 /// A second effect beside one of the two best singles, where the best single leaves something.
 pub(crate) fn pair(

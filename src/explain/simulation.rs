@@ -8,8 +8,9 @@ use super::data::{Data, Segment, Series};
 use super::effects::{Action, Definition};
 use super::error::ExplainError;
 use super::fit::{Effort, Fit, Problem};
+use super::offset::operating_point;
 use super::plant::Plant;
-use super::rebaseline::{rebaseline, shifted};
+use super::rebaseline::{MOST_DELAY, rebaseline, shifted};
 use super::run::MOST_STATES;
 use super::search::{Boring, single_effects};
 use super::structure::Structure;
@@ -159,7 +160,21 @@ fn of_model(recordings: &[Log], model: &Model, name: &str) -> Result<Known, Expl
         }
         plain.inputs += 1;
         plain.constant = true;
-        if let Some((plant, delay)) = rebaseline(&plain) {
+        // A delay of the wrong law helps no other: where the sign may be lost, none is put before everything.
+        let most_delay = if super::rectified::applies(&plain) {
+            0
+        } else {
+            MOST_DELAY
+        };
+        let mut found = rebaseline(&plain, most_delay);
+        if let Some((plant, delay)) = &found
+            && *delay > 0
+            && super::baseline::initial_states(plant, &shifted(&plain, *delay))
+                .is_some_and(|(_, missed)| super::tanks::miss_less(&plain, missed))
+        {
+            found = rebaseline(&plain, 0);
+        }
+        if let Some((plant, delay)) = found {
             let data = shifted(&plain, delay);
             if let Some((initial, _)) = super::baseline::initial_states(&plant, &data) {
                 return Ok(Known {
@@ -333,9 +348,35 @@ fn of_outputs(recordings: &[Log], logs: &[Log]) -> Result<Known, ExplainError> {
             relative: false,
         });
     }
+    if let Some(known) = about_a_level(&data, &noise_free, &delays) {
+        return Ok(known);
+    }
     learn_nonlinear(data, &noise_free, &structure, &simulator).ok_or(ExplainError::NotUnderstood {
         name: name(),
         misfit: simulator.misfit,
+    })
+}
+
+/// A simulator that is linear about an operating point.
+fn about_a_level(data: &Data, noise_free: &Data, delays: &[usize]) -> Option<Known> {
+    let level = operating_point(noise_free)?;
+    let mut about = noise_free.clone();
+    for segment in &mut about.segments {
+        for (y, level) in segment.outputs.iter_mut().zip(&level) {
+            for y in y {
+                *y -= level;
+            }
+        }
+    }
+    let mut simulator = identify_simulator(&about).filter(Simulator::is_linear)?;
+    let mut data = data.clone();
+    let rest = vec![0.0; data.inputs];
+    add_constant(&mut data, &mut simulator.plant, &rest, &level);
+    Some(Known {
+        structure: bare(&simulator.plant, &simulator.initial),
+        data,
+        delays: delays.to_vec(),
+        relative: false,
     })
 }
 
@@ -413,7 +454,7 @@ fn learn_nonlinear(
 }
 
 /// A plant without effects in minimal coordinates.
-fn bare(plant: &Plant, initial: &[Vec<f64>]) -> Structure {
+pub(crate) fn bare(plant: &Plant, initial: &[Vec<f64>]) -> Structure {
     let coordinates = Arc::new(Coordinates::new(plant));
     let initial = initial
         .iter()

@@ -146,6 +146,13 @@ impl Structure {
         &self.effects[self.first_new()..]
     }
 
+    /// Whether the plant is tanks: the linear plant is then only what they do near their mean levels.
+    pub fn is_tanks(&self) -> bool {
+        self.effects
+            .iter()
+            .any(|e| matches!(e.definition.action, Action::Process))
+    }
+
     /// Effects whose numbers are in the parameter vector.
     fn free_effects(&self) -> std::ops::Range<usize> {
         (if self.plant_free { 0 } else { self.known.len() })..self.effects.len()
@@ -440,9 +447,12 @@ impl Structure {
             inputs.to_mut().extend(moments);
         }
         let samples = segment.samples();
-        let mut outputs = match finer {
-            Some(finer) => finer.run(&with_paths, forces, x0, &inputs, samples, clock)?,
-            None => run(&with_paths, forces, x0, &inputs, samples, clock)?,
+        let mut outputs = if self.is_tanks() {
+            super::tanks::simulate(self, theta, &inputs, x0, clock)?
+        } else if let Some(finer) = finer {
+            finer.run(&with_paths, forces, x0, &inputs, samples, clock)?
+        } else {
+            run(&with_paths, forces, x0, &inputs, samples, clock)?
         };
         for (index, effect) in self.effects.iter().enumerate() {
             if matches!(effect.definition.action, Action::Mode) {

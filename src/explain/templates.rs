@@ -55,7 +55,7 @@ impl Bench<'_> {
                     ),
                 })
                 .collect(),
-            Action::Exact => Vec::new(),
+            Action::Exact | Action::Process => Vec::new(),
         }
     }
 
@@ -96,6 +96,11 @@ impl Bench<'_> {
             let y = run(&plant, &[], &zero, &input, w.len(), &self.clock(index))
                 .unwrap_or_else(|| vec![vec![0.0; w.len()]; plant.outputs]);
             series.extend(y);
+        }
+        for (y, slopes) in series.iter_mut().zip(self.slopes.iter().flatten()) {
+            for (y, slope) in y.iter_mut().zip(slopes) {
+                *y *= slope;
+            }
         }
         series
     }

@@ -62,6 +62,21 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: |_| Vec::new(),
     },
     Definition {
+        id: "coulomb_friction",
+        variant: "smooth",
+        name: "Coulomb friction with a smooth knee",
+        equation: "F = -Fc tanh(v/w)",
+        parameters: &[Parameter::positive("knee_width", Unit::Rate)],
+        mimics: &[Mimic {
+            effect: "quadratic_drag",
+            experiment: "the same input at half and at twice the amplitude: drag grows with it, dry friction shrinks against it",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Force(smooth, Needs::Rate, Sense::Resists),
+        starts: |_| Vec::new(),
+    },
+    Definition {
         id: "stribeck_friction",
         variant: "",
         name: "friction with breakaway (Stribeck)",
@@ -147,12 +162,46 @@ pub(super) static ENTRIES: &[Definition] = &[
     },
 ];
 
+/// Steps of the search for the force of a smooth knee; three are typical, halving alone reaches 1e-12.
+const KNEE_STEPS: usize = 40;
+
 fn no_shape(_: &Observed) -> Vec<Vec<f64>> {
     vec![vec![]]
 }
 
 fn coulomb(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     motion.stopping_force(1.0)
+}
+
+/// Saturates over a width of the speed, as friction in a lubricated or an elastic contact does. The force that is held
+/// over the interval is that of the speed in its middle, which it acts on itself: at no width this is Moreau's step.
+fn smooth(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    let gain = (0.5 * motion.rate_gain).max(0.0);
+    let free = motion.middle_rate();
+    // `f - tanh((free - gain f)/w)` rises with f: Newton's steps within a bracket that shrinks.
+    let (mut low, mut high) = if free < 0.0 { (-1.0, 0.0) } else { (0.0, 1.0) };
+    let mut f = (free / (p[0] + gain)).tanh();
+    for _ in 0..KNEE_STEPS {
+        let t = ((free - gain * f) / p[0]).tanh();
+        let excess = f - t;
+        if excess > 0.0 {
+            high = f;
+        } else {
+            low = f;
+        }
+        let next = f - excess / (1.0 + gain / p[0] * (1.0 - t * t));
+        let next = if next >= low && next <= high {
+            next
+        } else {
+            0.5 * (low + high)
+        };
+        let settled = (next - f).abs() < 1e-10;
+        f = next;
+        if settled {
+            break;
+        }
+    }
+    -f
 }
 
 /// Dahl's law ([`bristle_force`] without damping).

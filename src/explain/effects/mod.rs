@@ -27,6 +27,8 @@ pub enum Port {
     Sensor,
     /// Another dynamic path from the inputs to an output, beside the plant.
     Path,
+    /// The plant itself, which is of another class.
+    Process,
     /// Changes what the recording is, sample by sample; found by exact tests, not by fits.
     Exact,
 }
@@ -42,6 +44,10 @@ pub enum Unit {
     Position,
     /// That unit per second.
     Rate,
+    /// That unit per second, over the unit of the input channel.
+    RatePerInput,
+    /// The square root of that unit, per second.
+    RootRate,
     /// Seconds.
     Second,
     /// Hertz.
@@ -148,6 +154,8 @@ pub(crate) enum Action {
     Sine,
     /// The path of an input that the simulation lacks (`missing_input`).
     MissingPath,
+    /// Part of a plant of another class, which is run in place of the linear one (`tanks`).
+    Process,
     /// Found by an exact test; in the model it is a sensor law without effect on fits.
     Exact,
 }
@@ -161,6 +169,7 @@ impl std::fmt::Debug for Action {
             Self::Mode => "Mode",
             Self::Sine => "Sine",
             Self::MissingPath => "MissingPath",
+            Self::Process => "Process",
             Self::Exact => "Exact",
         })
     }
@@ -220,6 +229,7 @@ impl Definition {
             Action::Force(..) => Port::Force,
             Action::Sensor(_) | Action::Sine => Port::Sensor,
             Action::Mode | Action::MissingPath => Port::Path,
+            Action::Process => Port::Process,
             Action::Exact => Port::Exact,
         }
     }

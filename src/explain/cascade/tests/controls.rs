@@ -1,0 +1,120 @@
+//! Plants that are no tanks, and derivatives.
+
+use super::super::fit::{Problem, Trial};
+use super::super::*;
+use super::{DRY, noisy, normals, staircase};
+
+/// Two real poles and an offset: the root is not needed, and where it is in use it loses against proportional outflow.
+#[test]
+fn a_linear_plant_is_better_left_linear() {
+    for (seed, poles) in [[0.9, 0.95], [0.97, 0.5], [0.85, 0.85]]
+        .into_iter()
+        .enumerate()
+    {
+        let u = staircase(1000, 20, 10.0, seed as u64);
+        let (mut x1, mut x2) = (2.0, 3.0);
+        let mut y = Vec::with_capacity(u.len());
+        for u in &u {
+            y.push(x2 + 0.5);
+            (x1, x2) = (
+                poles[0] * x1 + (1.0 - poles[0]) * u,
+                poles[1] * x2 + (1.0 - poles[1]) * x1,
+            );
+        }
+        let fit = fit(
+            &[(&u, &noisy(&y, 0.1, 50 + seed as u64))],
+            &[vec![true; 1000]],
+        );
+        assert!(fit.is_none_or(|f| f.losses.outflow < -20.0), "{poles:?}");
+    }
+}
+
+#[test]
+fn what_is_no_tank_is_left_alone() {
+    let none = |u: &[f64], y: &[f64]| fit(&[(u, y)], &[vec![true; y.len()]]).is_none();
+    let u = staircase(500, 20, 10.0, 3);
+    let y = DRY.run(&u, [0.3, 0.4]);
+    assert!(!none(&u, &noisy(&y, 0.05, 1)));
+    // Its mean removed; fewer samples than can tell; an output of noise; a ringing one; an input about zero.
+    assert!(none(&u, &y.iter().map(|y| y - 2.0).collect::<Vec<_>>()));
+    assert!(none(&u[..80], &y[..80]));
+    assert!(none(
+        &u,
+        &normals(500, 4).iter().map(|e| 5.0 + e).collect::<Vec<_>>()
+    ));
+    let mut ringing = vec![5.0, 5.0];
+    for k in 2..500 {
+        let next: f64 = 1.9 * ringing[k - 1] - 0.95 * ringing[k - 2] + 0.05 * u[k - 1];
+        ringing.push(next);
+    }
+    assert!(none(
+        &u,
+        &ringing.iter().map(|y| y + 5.0).collect::<Vec<_>>()
+    ));
+    assert!(none(&normals(500, 5), &y));
+    assert!(
+        none(&u, &vec![1.0; 500]) && none(&vec![0.0; 500], &y) && none(&u, &vec![f64::NAN; 500])
+    );
+    assert!(fit(&[], &[]).is_none() && fit(&[(&u, &y)], &[]).is_none());
+}
+
+/// Gradients carried through the simulation against differences of the cost, with all parts acting.
+#[test]
+fn derivatives_match_differences() {
+    for law in [Law::Root, Law::Linear] {
+        let parts = Parts {
+            law,
+            upper_overflow: true,
+            lower_overflow: true,
+            constant_inflow: true,
+            pump_bias: true,
+        };
+        let cascade = Cascade {
+            parts,
+            numbers: [0.3, 0.4, 0.5, 1.1, 0.4, 1.3, 0.07, 0.11],
+        };
+        let u = staircase(300, 20, 4.0, 6);
+        let y: Vec<f64> = cascade
+            .simulate(&u, [1.0, 2.0])
+            .iter()
+            .zip(normals(300, 8))
+            .map(|(y, e)| y + e)
+            .collect();
+        let levels = cascade.levels(&u, [1.0, 2.0]);
+        assert!(levels.iter().any(|x| x[0] == 1.1) && levels.iter().any(|x| x[1] == 1.3));
+        let problem = Problem {
+            records: vec![(u, y)],
+            mask: vec![vec![true; 300]],
+            count: 300,
+        };
+        let trial = problem.priced(Trial {
+            cascade,
+            initial: vec![[1.0, 2.0]],
+            cost: 0.0,
+        });
+        let (_, pull) = problem.normal(&trial, &Number::ALL);
+        let cost = |i: usize, h: f64| {
+            let mut moved = trial.clone();
+            match i {
+                i if i < NUMBERS => moved.cascade.numbers[i] += h,
+                i => moved.initial[0][i - NUMBERS] += h,
+            }
+            problem.priced(moved).cost
+        };
+        for i in 0..NUMBERS + 2 {
+            let slope = (cost(i, 1e-6) - cost(i, -1e-6)) / 2e-6;
+            let factor = Number::ALL.get(i).map_or(1.0, |n| {
+                if n.positive() {
+                    cascade.number(*n)
+                } else {
+                    1.0
+                }
+            });
+            let carried = -2.0 * pull[i] / factor;
+            assert!(
+                (slope - carried).abs() < 1e-4 * (1.0 + slope.abs()),
+                "{law:?} {i}: {slope} {carried}"
+            );
+        }
+    }
+}

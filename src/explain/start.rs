@@ -1,0 +1,163 @@
+//! The state at the first sample of another recording.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::augmented::AugmentedError;
+use super::explanation::AugmentedModel;
+
+/// Samples that an initial state is estimated from, at most.
+const INITIAL_SAMPLES: usize = 2000;
+/// Weight of the prior of an initial state where the model has none: one sample's worth.
+const PRIOR: f64 = 1e-4;
+/// Steps of the search, at most.
+const STEPS: usize = 40;
+
+/// What is known of the state beforehand, in units of the errors of the scaled outputs.
+struct Prior {
+    mean: DVector<f64>,
+    weight: DMatrix<f64>,
+    spread: Vec<f64>,
+}
+
+impl Prior {
+    fn cost(&self, x: &DVector<f64>) -> f64 {
+        let e = x - &self.mean;
+        e.dot(&(&self.weight * &e))
+    }
+}
+
+impl AugmentedModel {
+    /// The initial state with which the model reproduces the first samples of `outputs` best, by a few steps of Gauss
+    /// and Newton. Spread and level of the states on the recording are the prior (maximum a posteriori), so that
+    /// directions which few samples do not determine stay sensible.
+    ///
+    /// # Errors
+    /// As [`AugmentedModel::simulate`].
+    pub fn estimate_initial_state(
+        &self,
+        inputs: &[&[f64]],
+        outputs: &[&[f64]],
+    ) -> Result<Vec<f64>, AugmentedError> {
+        let samples = inputs.first().map_or(0, |u| u.len()).min(INITIAL_SAMPLES);
+        let inputs: Vec<&[f64]> = inputs.iter().map(|u| &u[..samples]).collect();
+        let l = self.outputs.len();
+        let scale: Vec<f64> = outputs.iter().map(|y| deviation(&y[..samples])).collect();
+        let prior = self.prior(&scale)?;
+        let error = |x: &DVector<f64>| -> Result<DVector<f64>, AugmentedError> {
+            let y = self.run(&inputs, Some(x.as_slice()))?;
+            Ok(DVector::from_iterator(
+                l * samples,
+                (0..l).flat_map(|o| {
+                    let (y, scale) = (&y[o], scale[o]);
+                    (0..samples).map(move |k| (outputs[o][k] - y[k]) / scale)
+                }),
+            ))
+        };
+        // Where the cost has kinks (a rim, a lost sign) the search ends at the next minimum: it starts from several.
+        let mut best = climb(&error, &prior, prior.mean.clone())?;
+        if self.has_kinks() {
+            for i in 0..prior.mean.len() {
+                for side in [-1.0, 1.0] {
+                    let mut start = prior.mean.clone();
+                    start[i] += side * prior.spread[i];
+                    if let Ok(found) = climb(&error, &prior, start)
+                        && found.1 < best.1
+                    {
+                        best = found;
+                    }
+                }
+            }
+        }
+        Ok(best.0.iter().copied().collect())
+    }
+
+    /// Whether the outputs are no smooth function of the initial state.
+    fn has_kinks(&self) -> bool {
+        self.effects
+            .iter()
+            .any(|e| e.effect == "overflow" || e.effect == "sensor_rectification")
+    }
+
+    fn prior(&self, scale: &[f64]) -> Result<Prior, AugmentedError> {
+        let n = self.a.0.nrows();
+        let largest = scale.iter().copied().fold(0.0, f64::max);
+        let Some(prior) = &self.initial_state_prior else {
+            let spread = 3.0 * largest;
+            return Ok(Prior {
+                mean: DVector::zeros(n),
+                weight: DMatrix::identity(n, n) * (PRIOR / (spread * spread)),
+                spread: vec![spread; n],
+            });
+        };
+        let covariance = prior.covariance.clone().shaped(n, n);
+        let inverse = (covariance.shape() == (n, n))
+            .then(|| covariance.clone().cholesky())
+            .flatten()
+            .map(|c| c.inverse())
+            .ok_or_else(|| AugmentedError::Damaged {
+                what: "the covariance of the initial state is not positive definite".to_owned(),
+            })?;
+        Ok(Prior {
+            mean: DVector::from_column_slice(&prior.mean),
+            weight: inverse * (prior.error_std / largest).powi(2),
+            spread: (0..n).map(|i| covariance[(i, i)].sqrt()).collect(),
+        })
+    }
+}
+
+/// Standard deviation of an output, not zero.
+fn deviation(y: &[f64]) -> f64 {
+    let n = y.len().max(1) as f64;
+    let mean = y.iter().sum::<f64>() / n;
+    (y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n)
+        .sqrt()
+        .max(1e-12)
+}
+
+/// Levenberg and Marquardt from `x` on: the state and its cost.
+fn climb(
+    error: &dyn Fn(&DVector<f64>) -> Result<DVector<f64>, AugmentedError>,
+    prior: &Prior,
+    mut x: DVector<f64>,
+) -> Result<(DVector<f64>, f64), AugmentedError> {
+    let n = x.len();
+    let mut e = error(&x)?;
+    let mut cost = e.norm_squared() + prior.cost(&x);
+    let mut damping = 1e-3;
+    for _ in 0..STEPS {
+        let mut columns = DMatrix::zeros(e.len(), n);
+        for i in 0..n {
+            let step = 1e-6 * prior.spread[i];
+            let mut moved = x.clone();
+            moved[i] += step;
+            columns.set_column(i, &((&e - error(&moved)?) / step));
+        }
+        let mut gram = columns.tr_mul(&columns);
+        for i in 0..n {
+            gram[(i, i)] *= 1.0 + damping;
+        }
+        let right = columns.tr_mul(&e) - &prior.weight * (&x - &prior.mean);
+        let Some(step) = (gram + &prior.weight).cholesky().map(|c| c.solve(&right)) else {
+            break;
+        };
+        let trial = &x + step;
+        let now = error(&trial).map(|e| (e.norm_squared() + prior.cost(&trial), e));
+        match now {
+            Ok((now, ahead)) if now < cost => {
+                let settled = cost - now < 1e-9 * cost;
+                x = trial;
+                e = ahead;
+                cost = now;
+                damping *= 0.2;
+                if settled {
+                    break;
+                }
+            }
+            _ => damping = f64::max(damping * 10.0, 1e-6),
+        }
+        if damping > 1e9 {
+            break;
+        }
+    }
+    Ok((x, cost))
+}
