@@ -102,6 +102,7 @@ impl AugmentedModel {
                 .map(|s| structure.initial_state(theta, s).to_vec())
                 .collect(),
             effects,
+            mechanics: None,
             reference: None,
         }
     }

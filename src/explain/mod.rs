@@ -17,6 +17,7 @@
 //! | `noise`, `fit` | coloured, heavy-tailed noise; Levenberg and Marquardt |
 //! | `screen`, `templates`, `features` | one Gauss-Newton step for everything |
 //! | `search`, `refine`, `plausible`, `second`, `inquiry` | the fits, what is kept of them, the decision |
+//! | `weak` | drives: the averaged equation of motion, where a free run cannot tell |
 //! | `exact`, `adequacy` | tests without fits, and of what is left |
 //! | `locate`, `curve`, `prove`, `probability` | where, the law without a form, held-out blocks, how sure |
 //! | `answer`, `account`, `words`, `explanation`, `augmented` | what is said, and the model that can be run |
@@ -51,6 +52,7 @@ mod second;
 mod simulation;
 mod structure;
 mod templates;
+mod weak;
 mod words;
 
 pub use answer::{Options, explain};
@@ -58,7 +60,7 @@ pub use augmented::AugmentedError;
 pub use error::ExplainError;
 pub use explanation::{
     Alternative, AugmentedModel, Curve, Detectable, EXPLANATION_FORMAT, EffectFound, EffectSize,
-    Evidence, Explanation, FitFigure, FitSteps, FitTable, Location, ModelEffect, NoiseFound,
+    Evidence, Explanation, FitFigure, FitSteps, FitTable, Location, Mechanics, ModelEffect, NoiseFound,
     ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces, Verdict,
 };
 pub use simulation::Simulation;

@@ -26,6 +26,8 @@ pub(crate) enum More {
     Breakaway,
     /// Multiples of the sample time.
     Samples(&'static [f64]),
+    /// A number that starts at zero.
+    Zero,
 }
 
 pub(crate) const REFINEMENTS: &[Refinement] = &[
@@ -68,6 +70,11 @@ pub(crate) const REFINEMENTS: &[Refinement] = &[
         simple: ("end_stop", "both"),
         rich: ("end_stop", "both damped"),
         more: More::Samples(&[0.5]),
+    },
+    Refinement {
+        simple: ("cubic_stiffness", ""),
+        rich: ("cubic_stiffness", "off centre"),
+        more: More::Zero,
     },
     Refinement {
         simple: ("input_delay", ""),
@@ -134,6 +141,7 @@ pub(crate) fn derived(
         };
         let starts: Vec<Vec<f64>> = match &refinement.more {
             More::Nothing => vec![vec![]],
+            More::Zero => vec![vec![0.0]],
             More::Numbers(numbers) => numbers.iter().map(|v| vec![v.ln()]).collect(),
             More::Samples(samples) => samples
                 .iter()

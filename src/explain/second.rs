@@ -8,10 +8,10 @@ use super::search::{Ranked, second_effects};
 
 /// A second effect must bring this share of what the first brought: misfit of the first breeds false seconds
 /// (math/explain.md, choice 9).
-const SECOND_SHARE: f64 = 0.1;
+pub(crate) const SECOND_SHARE: f64 = 0.1;
 
 /// ... and at least this much.
-const SECOND_GAIN: f64 = 30.0;
+pub(crate) const SECOND_GAIN: f64 = 30.0;
 
 /// A second effect beside one of the two best singles, where the best single leaves something.
 pub(crate) fn pair(
@@ -158,7 +158,7 @@ const KINDS: &[&[&str]] = &[
     &["gain_change", "stiffness_change"],
 ];
 
-fn look_alikes(a: &str, b: &str) -> bool {
+pub(crate) fn look_alikes(a: &str, b: &str) -> bool {
     KINDS
         .iter()
         .any(|kind| kind.contains(&a) && kind.contains(&b))

@@ -414,7 +414,7 @@ fn learn_nonlinear(
 }
 
 /// A plant without effects in minimal coordinates.
-fn bare(plant: &Plant, initial: &[Vec<f64>]) -> Structure {
+pub(crate) fn bare(plant: &Plant, initial: &[Vec<f64>]) -> Structure {
     let coordinates = Arc::new(Coordinates::new(plant));
     let initial = initial
         .iter()

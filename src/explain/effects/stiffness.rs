@@ -19,6 +19,22 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: no_shape,
     },
     Definition {
+        id: "cubic_stiffness",
+        variant: "off centre",
+        name: "cubic stiffness",
+        equation: "F = -k3 (x - centre)^3",
+        parameters: &[Parameter::real("centre", Unit::Position)],
+        mimics: &[Mimic {
+            effect: "end_stop",
+            experiment: "a slow ramp over the whole travel: a stop has a corner, a cubic spring has none",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Force(cubic_off_centre, Needs::Position, Sense::Either),
+        // Grows out of the one about zero.
+        starts: |_| Vec::new(),
+    },
+    Definition {
         id: "quadratic_stiffness",
         variant: "odd",
         name: "quadratic stiffness x|x|",
@@ -154,6 +170,25 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: yield_distances,
     },
     Definition {
+        id: "cogging",
+        variant: "",
+        name: "force that repeats with the position (cogging)",
+        equation: "F = -Fa sin(2 pi x/pitch + phase)",
+        parameters: &[
+            Parameter::positive("pitch", Unit::Position),
+            Parameter::real("phase", Unit::Radian),
+        ],
+        mimics: &[Mimic {
+            effect: "periodic_disturbance",
+            experiment: "the same travel at twice the speed: cogging keeps its places, a disturbance keeps its times",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Force(cogging, Needs::Position, Sense::Either),
+        // Many periods in a travel: only the averaged equation of motion finds the pitch.
+        starts: |_| Vec::new(),
+    },
+    Definition {
         id: "position_dependent_gain",
         variant: "",
         name: "gain that depends on position",
@@ -193,6 +228,11 @@ fn cubic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     -x * x * x
 }
 
+fn cubic_off_centre(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    let x = motion.middle() - p[0];
+    -x * x * x
+}
+
 fn odd_quadratic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     let x = motion.middle();
     -x * x.abs()
@@ -201,6 +241,10 @@ fn odd_quadratic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
 fn even_quadratic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     let x = motion.middle();
     -x * x
+}
+
+fn cogging(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    -(std::f64::consts::TAU * motion.middle() / p[0] + p[1]).sin()
 }
 
 fn input_times_position(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
