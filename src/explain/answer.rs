@@ -274,9 +274,11 @@ impl Answer<'_> {
             _ => None,
         };
         let heldout_gain = match (&refit_parameters, &refit_model) {
-            _ if self.finding.weak.is_some() => {
-                self.finding.weak.as_ref().and_then(|proof| proof.heldout_gain)
-            }
+            _ if self.finding.weak.is_some() => self
+                .finding
+                .weak
+                .as_ref()
+                .and_then(|proof| proof.heldout_gain),
             (Some(p), Some(m)) => Some(
                 p.noise.deviance(&p.residual, &test_mask)
                     - m.noise.deviance(&m.residual, &test_mask),

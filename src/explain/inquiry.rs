@@ -159,7 +159,7 @@ pub(crate) fn inquire(
         let second = if nothing_left {
             None
         } else {
-            pair(&problem, &ranked_all, base, allowed)
+            pair(&problem, &ranked_all, finding.boring.best(count), allowed)
         };
         if let Some(pair) = second {
             let polished = polished(&problem, &pair);

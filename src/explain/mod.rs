@@ -60,7 +60,8 @@ pub use augmented::AugmentedError;
 pub use error::ExplainError;
 pub use explanation::{
     Alternative, AugmentedModel, Curve, Detectable, EXPLANATION_FORMAT, EffectFound, EffectSize,
-    Evidence, Explanation, FitFigure, FitSteps, FitTable, Location, Mechanics, ModelEffect, NoiseFound,
-    ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces, Verdict,
+    Evidence, Explanation, FitFigure, FitSteps, FitTable, Location, Mechanics, ModelEffect,
+    NoiseFound, ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces,
+    Verdict,
 };
 pub use simulation::Simulation;

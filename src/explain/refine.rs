@@ -26,8 +26,8 @@ pub(crate) enum More {
     Breakaway,
     /// Multiples of the sample time.
     Samples(&'static [f64]),
-    /// A number that starts at zero.
-    Zero,
+    /// Plain numbers.
+    Plain(&'static [f64]),
 }
 
 pub(crate) const REFINEMENTS: &[Refinement] = &[
@@ -74,7 +74,8 @@ pub(crate) const REFINEMENTS: &[Refinement] = &[
     Refinement {
         simple: ("cubic_stiffness", ""),
         rich: ("cubic_stiffness", "off centre"),
-        more: More::Zero,
+        // Where the simple one is: about zero, in the middle of the interval.
+        more: More::Plain(&[0.0, 0.5]),
     },
     Refinement {
         simple: ("input_delay", ""),
@@ -141,7 +142,7 @@ pub(crate) fn derived(
         };
         let starts: Vec<Vec<f64>> = match &refinement.more {
             More::Nothing => vec![vec![]],
-            More::Zero => vec![vec![0.0]],
+            More::Plain(numbers) => vec![numbers.to_vec()],
             More::Numbers(numbers) => numbers.iter().map(|v| vec![v.ln()]).collect(),
             More::Samples(samples) => samples
                 .iter()

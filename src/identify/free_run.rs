@@ -2,7 +2,7 @@
 //!
 //! A recording with little noise of a plant that is not linear has no linear order: every further state follows the
 //! nonlinear part of the motion a little better, and the evidence for it is beyond doubt, because noise is what
-//! evidence is measured against. The singular values then do not end, and a test against noise accepts nothing. What a
+//! evidence is measured against. The singular values then hardly end, and a test against noise accepts nothing. What a
 //! linear model can give there is the best linear approximation of the plant, and how good it is shows in free run: its
 //! error is the nonlinear part, which is strongly correlated in time and so is worth far fewer samples than there are
 //! (Bartlett 1946). By Schwarz's criterion with that many samples, states that only follow the nonlinear part do not pay.
@@ -26,8 +26,12 @@ use crate::model::StateSpace;
 
 /// Orders that are run.
 const ORDERS: [usize; 15] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 15, 20, 25, 30];
-/// An order this high is not one of a few states with a nonlinearity: the singular values were right not to end.
-const NOT_LOW: usize = 20;
+/// From this proposal of the singular values on the free run is asked: plants of so many states are rare, and plants
+/// that are not linear are not.
+const MANY: usize = 15;
+/// The free run overrules the singular values where it asks for this share of their order at most; else they were
+/// right.
+const FEW: f64 = 0.5;
 /// Samples that are run, at most.
 const LONGEST_RUN: usize = 200_000;
 /// Lags over which the correlation of the error is summed.
@@ -44,8 +48,8 @@ pub struct LowOrder {
     pub explanation: String,
 }
 
-/// The order by free run, when the singular values end nowhere; `None` when they do, or when the free run asks for a
-/// high order as well.
+/// The order by free run, when the singular values ask for many states; `None` when they do not, or when the free run
+/// asks for many as well.
 ///
 /// # Errors
 /// When reading the recordings again fails, or the decomposition.
@@ -57,7 +61,11 @@ pub fn low_order(
     sample_time: f64,
 ) -> Result<Option<LowOrder>, IdentifyError> {
     let Windowed { factor, varx } = windowed;
-    if !matches!(options.order, Order::Auto) || !endless(windowed, options)? {
+    if !matches!(options.order, Order::Auto) {
+        return Ok(None);
+    }
+    let proposal = proposal(windowed, options)?;
+    if proposal < MANY {
         return Ok(None);
     }
     let weight = options
@@ -114,22 +122,22 @@ pub fn low_order(
         })
         .filter(|(criterion, ..)| criterion.is_finite())
         .min_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((_, order, unstable)) = best.filter(|b| b.1 < NOT_LOW) else {
+    let Some((_, order, unstable)) = best.filter(|b| b.1 as f64 <= FEW * proposal as f64) else {
         return Ok(None);
     };
     Ok(Some(LowOrder {
         order,
         unstable,
         explanation: format!(
-            "order {order}: the singular values end nowhere, so no linear model of a low order explains the recording; \
-             of orders 1 to {} the free run asks for this one (its error is worth {independent:.0} independent samples)",
+            "order {order}: the singular values ask for {proposal}, as they do for a plant that is not linear; of orders \
+             1 to {} the free run asks for this one (its error is worth {independent:.0} independent samples)",
             systems.last().map_or(order, |s| s.0)
         ),
     }))
 }
 
-/// Whether the singular value criterion still falls at the largest order that is considered.
-fn endless(windowed: &Windowed, options: &Options) -> Result<bool, IdentifyError> {
+/// The order that the singular value criterion proposes.
+fn proposal(windowed: &Windowed, options: &Options) -> Result<usize, IdentifyError> {
     let Windowed { factor, varx } = windowed;
     let largest = order::LARGEST_AUTOMATIC_ORDER;
     let future = options
@@ -145,7 +153,7 @@ fn endless(windowed: &Windowed, options: &Options) -> Result<bool, IdentifyError
         factor.columns,
         possible.min(largest),
     );
-    Ok(order::proposal(&evidence) == Some(largest))
+    Ok(order::proposal(&evidence).unwrap_or(1))
 }
 
 /// Errors of the free runs from rest, in scaled units: one series an output for each system.
@@ -171,8 +179,7 @@ fn free_runs(
                 for k in 0..columns[0].len() {
                     let value = |c: usize| (columns[c][k] - trend.at(c, at)) / data.scale[c];
                     let u = DVector::from_fn(inputs, |j, _| value(j));
-                    for (((_, system, _), x), e) in
-                        systems.iter().zip(&mut states).zip(&mut errors)
+                    for (((_, system, _), x), e) in systems.iter().zip(&mut states).zip(&mut errors)
                     {
                         let y = &system.c * &*x + &system.d * &u;
                         for (o, e) in e.iter_mut().enumerate() {

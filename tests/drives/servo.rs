@@ -99,7 +99,12 @@ impl Drive {
             speed,
             mass,
             viscous: push / quick * dice.between(0.3, 1.0),
-            load: push * dice.between(-0.1, 0.1),
+            // Of a speed it cannot be told from an offset of the sensor.
+            load: if speed {
+                0.0
+            } else {
+                push * dice.between(-0.1, 0.1)
+            },
             size,
             pitch: travel * dice.scale_between(0.05, 0.3),
             bristles,

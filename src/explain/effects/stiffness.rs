@@ -22,8 +22,11 @@ pub(super) static ENTRIES: &[Definition] = &[
         id: "cubic_stiffness",
         variant: "off centre",
         name: "cubic stiffness",
-        equation: "F = -k3 (x - centre)^3",
-        parameters: &[Parameter::real("centre", Unit::Position)],
+        equation: "F = -k3 (x - centre)^3, x at this instant of the sample interval",
+        parameters: &[
+            Parameter::real("centre", Unit::Position),
+            Parameter::between("instant", Unit::Ratio, 0.0, 1.0),
+        ],
         mimics: &[Mimic {
             effect: "end_stop",
             experiment: "a slow ramp over the whole travel: a stop has a corner, a cubic spring has none",
@@ -228,8 +231,10 @@ fn cubic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     -x * x * x
 }
 
+/// About its own centre; and taken at a fitted instant of the sample interval, because a force that is held over the
+/// interval stands for one that moves in it, which matters when an oscillation has few samples.
 fn cubic_off_centre(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    let x = motion.middle() - p[0];
+    let x = motion.position + p[1] * (motion.position_free - motion.position) - p[0];
     -x * x * x
 }
 

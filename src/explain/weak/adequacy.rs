@@ -14,7 +14,7 @@ const CORNERS: usize = 9;
 /// Structure that is left may be this share of the force (squared) that the equation's last step has explained: an
 /// unnamed law of a third of its size. Friction of real drives is a textbook law to some ten percents (load
 /// distribution, lubrication and direction all change it).
-const IMPERFECTION: f64 = 0.1;
+pub(crate) const IMPERFECTION: f64 = 0.1;
 
 /// Whether the rest is noise, or little beside what was found.
 pub(crate) fn holds(a: &Adequacy) -> bool {

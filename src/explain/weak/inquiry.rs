@@ -35,8 +35,10 @@ const HOPELESS: f64 = 0.3;
 const LAW_IMPERFECTION: f64 = 0.02;
 /// The free run may be worse than that of the simulation by this factor, for rounding.
 const NO_WORSE: f64 = 1.02;
-/// A second law must lower the squared free-run error of the half that was not fitted to this share: the averaged
-/// equation sees forces of a hundredth of the largest, and a law that does not show in free run is no explanation.
+/// A second law is looked for only where the first leaves more than a textbook law does of a real drive
+/// (`adequacy::IMPERFECTION`), and it must lower the squared free-run error of the half that was not fitted to this
+/// share: the averaged equation sees forces of a hundredth of the largest, and a law that does not show in free run is
+/// no explanation.
 const PAYS: f64 = 0.9;
 /// Forces that change with the side only: of these a recording hardly tells two apart.
 const SIDES: [&str; 3] = ["coulomb_friction", "stribeck_friction", "input_dead_zone"];
@@ -54,6 +56,8 @@ pub(crate) struct Proof {
     pub halves_disagree: Option<f64>,
     pub adequacy: Option<Adequacy>,
     pub adequate: bool,
+    /// What the little that is left resembles, with its evidence.
+    pub resembles: Option<(&'static Definition, f64)>,
     /// Half length of the windows in samples.
     pub half: usize,
 }
@@ -115,7 +119,7 @@ fn inside(windows: &Windows, mask: &Mask) -> Windows {
     })
 }
 
-/// Errors of an equation with given coefficients on other windows.
+/// Mean square error of the acceleration that an equation with given coefficients foretells on other windows.
 fn foretold(
     equation: &Equation,
     coefficients: &[f64],
@@ -123,7 +127,8 @@ fn foretold(
     data: &Data,
 ) -> Option<f64> {
     let e = equation.errors(windows, data, coefficients);
-    (!e.is_empty()).then(|| e.iter().map(|v| v * v).sum::<f64>() / e.len() as f64)
+    let mass = coefficients[0].powi(2).max(1e-300);
+    (!e.is_empty()).then(|| e.iter().map(|v| v * v).sum::<f64>() / e.len() as f64 / mass)
 }
 
 /// Everything that one reading of the output gives.
@@ -135,7 +140,11 @@ struct Ranking {
     unexplained: f64,
 }
 
-fn ranking(data: &Data, reading: Reading, allowed: &dyn Fn(&Definition) -> bool) -> Option<Ranking> {
+fn ranking(
+    data: &Data,
+    reading: Reading,
+    allowed: &dyn Fn(&Definition) -> bool,
+) -> Option<Ranking> {
     let windows = Windows::choose(data, reading)?;
     let forms = Form::all(reading, allowed);
     let plain = Equation {
@@ -220,7 +229,10 @@ pub(crate) fn attempt(
         .min_by(|a, b| a.unexplained.total_cmp(&b.unexplained))?;
     let plain = best_of(&chosen.candidates, 0)?.clone();
     let integrates = chosen.windows.reading == Reading::Position
-        && chosen.candidates.first().is_some_and(|c| !c.equation.spring);
+        && chosen
+            .candidates
+            .first()
+            .is_some_and(|c| !c.equation.spring);
     if chosen.unexplained > 1.0 - EXPLAINED || !(missed > HOPELESS || integrates) {
         return None;
     }
@@ -243,6 +255,7 @@ pub(crate) fn attempt(
 struct Decided {
     equation: Equation,
     gain: f64,
+    resembles: Option<(&'static Definition, f64)>,
 }
 
 fn decide(chosen: &Ranking, data: &Data, problem: &Problem) -> Option<Decided> {
@@ -271,12 +284,13 @@ fn decide(chosen: &Ranking, data: &Data, problem: &Problem) -> Option<Decided> {
         .iter()
         .filter(|c| c.equation.laws.len() == 1)
         .min_by(|a, b| (a.criterion + owes(a)).total_cmp(&(b.criterion + owes(b))));
-    let Some(first) = first.filter(|c| {
-        plain.criterion - c.criterion > NEEDED && a_mass(c) && foretells(c, plain)
-    }) else {
+    let Some(first) = first
+        .filter(|c| plain.criterion - c.criterion > NEEDED && a_mass(c) && foretells(c, plain))
+    else {
         return a_mass(plain).then(|| Decided {
             equation: plain.equation.clone(),
             gain: 0.0,
+            resembles: None,
         });
     };
     let gain = plain.criterion - first.criterion;
@@ -293,23 +307,38 @@ fn decide(chosen: &Ranking, data: &Data, problem: &Problem) -> Option<Decided> {
         .copied()
         .collect();
     let seconds = rank(windows, data, &first.equation, &others, None);
-    let single = best_of(&seconds, 1);
-    let pair = best_of(&seconds, 2);
-    if let (Some(single), Some(pair)) = (single, pair) {
+    let left = first.equation.fit(windows, data, false).and_then(|fit| {
+        adequacy(
+            windows,
+            data,
+            &first.equation,
+            &fit,
+            plain.regression.squares,
+        )
+    });
+    let suffices = left.as_ref().is_none_or(holds);
+    let mut resembles = None;
+    if let (Some(single), Some(pair)) = (best_of(&seconds, 1), best_of(&seconds, 2)) {
         let more = single.criterion - pair.criterion;
-        if more > SECOND_GAIN.max(SECOND_SHARE * gain)
+        if more > NEEDED {
+            resembles = last_law(pair).map(|law| (law, more));
+        }
+        if !suffices
+            && more > SECOND_GAIN.max(SECOND_SHARE * gain)
             && foretells(pair, first)
             && runs_better(&pair.equation, &first.equation, windows, data, problem)
         {
             return Some(Decided {
                 equation: pair.equation.clone(),
                 gain: gain + more,
+                resembles: None,
             });
         }
     }
     Some(Decided {
         equation: first.equation.clone(),
         gain,
+        resembles,
     })
 }
 
@@ -333,7 +362,11 @@ fn runs_better(
             let own: Mask = problem
                 .mask
                 .iter()
-                .map(|m| (0..m.len()).map(|k| (k < m.len() / 2) == first_half).collect())
+                .map(|m| {
+                    (0..m.len())
+                        .map(|k| (k < m.len() / 2) == first_half)
+                        .collect()
+                })
                 .collect();
             let other: Mask = own.iter().map(|m| m.iter().map(|k| !k).collect()).collect();
             let (fit, _) = tethered(equation, &inside(windows, &own), data, &own)?;
@@ -353,7 +386,11 @@ fn finding(
 ) -> Option<Finding> {
     let data = problem.data;
     let windows = &chosen.windows;
-    let Decided { equation, gain } = decided;
+    let Decided {
+        equation,
+        gain,
+        resembles,
+    } = decided;
     let (fit, regression) = tethered(&equation, windows, data, &problem.mask)?;
     let (linear, _) = tethered(&plain.equation, windows, data, &problem.mask)?;
     let model = as_fit(problem, &equation, &fit)?;
@@ -439,6 +476,7 @@ fn finding(
             halves_disagree,
             adequacy,
             adequate,
+            resembles,
             half: windows.half,
         })),
         model: if verdict == Verdict::Consistent {
@@ -455,7 +493,11 @@ fn halves(equation: &Equation, windows: &Windows, data: &Data) -> Option<f64> {
     let middle = windows.places[n / 2];
     let half = |first: bool| {
         equation
-            .fit(&windows.only(|s, k| ((s, k) < middle) == first), data, false)
+            .fit(
+                &windows.only(|s, k| ((s, k) < middle) == first),
+                data,
+                false,
+            )
             .map(|r| (r.coefficients.clone(), r.covariance()))
     };
     let ((a, p), (b, q)) = (half(true)?, half(false)?);

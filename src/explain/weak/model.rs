@@ -75,12 +75,7 @@ impl Equation {
     }
 
     /// Target and columns of the regression.
-    fn system(
-        &self,
-        windows: &Windows,
-        data: &Data,
-        ranking: bool,
-    ) -> (Vec<f64>, Vec<Vec<f64>>) {
+    fn system(&self, windows: &Windows, data: &Data, ranking: bool) -> (Vec<f64>, Vec<Vec<f64>>) {
         let start = data.segments[0].start_time;
         let one = vec![1.0; windows.places.len()];
         let mut target = windows.force.clone();
@@ -136,7 +131,9 @@ impl Equation {
                 .laws
                 .iter()
                 .zip(self.places(true))
-                .all(|((form, _), (at, count))| form.is_physical(&c.as_slice()[at..at + count], side))
+                .all(|((form, _), (at, count))| {
+                    form.is_physical(&c.as_slice()[at..at + count], side)
+                })
     }
 
     /// The last law's shape moved to where it fits best, within `width` (a factor) of what it is.
@@ -151,7 +148,7 @@ impl Equation {
             equation
                 .fit(windows, data, true)
                 .filter(|r| equation.is_physical(r))
-                .map_or(f64::INFINITY, |r| r.squares)
+                .map_or(f64::INFINITY, |r| r.motion_squares())
         };
         let mut least = cost(&self);
         let mut width = width.ln();
@@ -183,7 +180,11 @@ impl Equation {
         if !coefficients.iter().all(|c| c.is_finite()) || mass == 0.0 {
             return None;
         }
-        let spring = if self.spring { coefficients[PLAIN] } else { 0.0 };
+        let spring = if self.spring {
+            coefficients[PLAIN]
+        } else {
+            0.0
+        };
         let n = match self.reading {
             Reading::Position => 2,
             Reading::Velocity => 1,
@@ -228,7 +229,11 @@ impl Equation {
                 theta.extend(push.iter().map(|b| b * amplitude));
             }
             for (p, v) in form.definition.parameters.iter().zip(&parameters) {
-                theta.push(if p.logarithmic { v.max(p.lower).ln() } else { *v });
+                theta.push(if p.logarithmic {
+                    v.max(p.lower).ln()
+                } else {
+                    *v
+                });
             }
             effects.push(Instance {
                 definition: form.definition,

@@ -65,7 +65,7 @@ pub(crate) fn rank(
                     let regression = equation.fit(windows, data, true)?;
                     equation
                         .is_physical(&regression)
-                        .then_some((regression.squares, equation))
+                        .then_some((regression.motion_squares(), equation))
                 })
                 .min_by(|a, b| a.0.total_cmp(&b.0));
             if let Some((_, equation)) = best {
@@ -75,7 +75,9 @@ pub(crate) fn rank(
         }
     }
     let criterion = |c: &Candidate, n: f64| {
-        n * (c.regression.squares / windows.places.len() as f64).max(1e-300).ln()
+        n * (c.regression.motion_squares() / windows.places.len() as f64)
+            .max(1e-300)
+            .ln()
             + c.equation.owed(&c.regression) * n.max(2.0).ln()
     };
     let white = windows.places.len() as f64;
@@ -99,5 +101,9 @@ pub(crate) fn best_of(candidates: &[Candidate], laws: usize) -> Option<&Candidat
 
 /// The law that a candidate has more than its base.
 pub(crate) fn last_law(candidate: &Candidate) -> Option<&'static Definition> {
-    candidate.equation.laws.last().map(|(form, _)| form.definition)
+    candidate
+        .equation
+        .laws
+        .last()
+        .map(|(form, _)| form.definition)
 }

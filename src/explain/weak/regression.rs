@@ -56,6 +56,12 @@ impl Regression {
         effective(&self.residual)
     }
 
+    /// Sum of squared errors of the motion: over the square of the first coefficient, which is the mass. Laws that change
+    /// the input change what the errors of the force are measured in; those of the acceleration stay the same.
+    pub fn motion_squares(&self) -> f64 {
+        self.squares / self.coefficients[0].powi(2).max(1e-300)
+    }
+
     /// Covariance of the coefficients, with as many windows as are independent.
     pub fn covariance(&self) -> DMatrix<f64> {
         let n = self.residual.len() as f64;

@@ -28,7 +28,8 @@ impl Proof {
                 p_value: 1.0,
                 share: 0.0,
                 features: 0,
-                sentence: "The recording is too short to test what is left of the force.".to_owned(),
+                sentence: "The recording is too short to test what is left of the force."
+                    .to_owned(),
             };
         };
         let sentence = if a.p_value > super::super::adequacy::LEVEL {
@@ -37,8 +38,15 @@ impl Proof {
                 a.features, a.p_value
             )
         } else if self.adequate {
+            let resembles = self.resembles.map_or_else(String::new, |(law, gain)| {
+                format!(
+                    " It resembles {} (evidence {}).",
+                    law.name,
+                    words::number(gain)
+                )
+            });
             format!(
-                "{:.0} % of what is left of the force is structure still: real, and {:.1} % of what was found.",
+                "{:.0} % of what is left of the force is structure still: real, but {:.1} % of what was found.{resembles}",
                 100.0 * a.share,
                 100.0 * a.of_removed
             )
@@ -76,9 +84,9 @@ impl Answer<'_> {
             quantity(2, &units.force),
         );
         let stiffness = proof.equation.spring.then(|| quantity(3, &units.stiffness));
-        let spring = stiffness
-            .as_ref()
-            .map_or_else(String::new, |k| format!(", stiffness {}", words::quantity(k)));
+        let spring = stiffness.as_ref().map_or_else(String::new, |k| {
+            format!(", stiffness {}", words::quantity(k))
+        });
         let wired = if side < 0.0 {
             " The input pushes backwards."
         } else {

@@ -145,7 +145,8 @@ pub(crate) fn tether(
         let away = |p: &[f64]| DVector::from_fn(m, |i, _| p[free[i].0] - centre[free[i].0]);
         let cost = |e: &[f64], p: &[f64]| {
             let d = away(p);
-            weight * e.iter().map(|v| v * v).sum::<f64>() + (d.transpose() * &precision * &d)[(0, 0)]
+            weight * e.iter().map(|v| v * v).sum::<f64>()
+                + (d.transpose() * &precision * &d)[(0, 0)]
         };
         let mut now = cost(&e, &p);
         let mut damping = 1e-3;
