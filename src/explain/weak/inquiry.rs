@@ -451,7 +451,6 @@ fn finding(
         }
     };
     let halves_disagree = found.then(|| halves(&equation, windows, data)).flatten();
-    let shown = adequacy.map(|a| Adequacy { ..a });
     Some(Finding {
         verdict,
         boring: Boring {
@@ -465,7 +464,7 @@ fn finding(
         rivals,
         freezes: Vec::new(),
         coarse: None,
-        adequacy: shown,
+        adequacy,
         count: problem.count(),
         detectable: Vec::new(),
         weak: Some(Box::new(Proof {
