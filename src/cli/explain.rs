@@ -24,7 +24,8 @@ Effects (for --without):
   coulomb_friction stribeck_friction quadratic_drag cubic_stiffness quadratic_stiffness end_stop hysteresis
   position_dependent_gain input_saturation input_dead_zone input_backlash input_rate_limit input_asymmetry input_delay
   actuator_lag sensor_saturation sensor_offset sensor_drift sensor_rectification sensor_quantization sensor_freeze
-  periodic_disturbance load_step extra_mode missing_input gain_change stiffness_change tank_outflow overflow
+  periodic_disturbance load_step extra_mode missing_input gain_change stiffness_change tank_outflow overflow;
+  of drives also cogging direction_dependent_friction
 
 Exit codes: 0 the simulation agrees with the recording; 1 something is missing in it; 2 an error.
 With --output or --report the exit code is 0 whatever was found, unless --exit-code is given.";

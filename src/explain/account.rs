@@ -224,12 +224,6 @@ impl Answer<'_> {
         let numbers = structure.effect_numbers(&model.theta, index);
         let offset = structure.effect_offset(index);
         let fixed = !structure.plant_free && index < structure.known.len();
-        let per = match effect.definition.id {
-            "cubic_stiffness" => 3,
-            "quadratic_stiffness" | "quadratic_drag" => 2,
-            "end_stop" | "stiffness_change" | "position_dependent_gain" => 1,
-            _ => 0,
-        };
         let (value, std, unit) = match effect.direction {
             Direction::Matched(input) => (
                 numbers[0],
@@ -264,28 +258,9 @@ impl Answer<'_> {
         };
         let (_, output) = self.channels_of(effect);
         let of = output.unit.clone().unwrap_or_default();
-        let rate_unit = if matches!(effect.signal, Signal::Integral(_)) {
-            of.clone()
-        } else {
-            format!("{of}/s")
-        };
-        let unit = match (unit.is_empty() || of.is_empty(), per, effect.definition.id) {
-            (_, 0, _) => unit,
-            (true, ..) => String::new(),
-            (false, 1, _) => format!("{unit}/({of})"),
-            (false, p, "quadratic_drag") => format!("{unit}/({rate_unit})^{p}"),
-            (false, p, _) => format!("{unit}/({of})^{p}"),
-        };
-        let name = match effect.definition.id {
-            "coulomb_friction" | "stribeck_friction" => "friction_force",
-            "quadratic_drag" => "drag",
-            "hysteresis" => "loop_force",
-            "load_step" => "load",
-            "end_stop" => "stop_stiffness",
-            "stiffness_change" => "stiffness_change",
-            "position_dependent_gain" => "gain_per_position",
-            _ => "stiffness",
-        };
+        let integral = matches!(effect.signal, Signal::Integral(_));
+        let unit = amplitude_unit(effect.definition.id, &unit, &of, integral);
+        let name = amplitude_name(effect.definition.id);
         parameters.insert(name.to_owned(), Quantity { value, std, unit });
     }
 
@@ -516,7 +491,47 @@ fn held(plant: &super::plant::Plant, row: Vec<f64>) -> Vec<f64> {
     held.iter().copied().collect()
 }
 
-fn port_name(port: Port) -> &'static str {
+/// What the amplitude of a force is called.
+pub(crate) fn amplitude_name(id: &str) -> &'static str {
+    match id {
+        "coulomb_friction" | "stribeck_friction" => "friction_force",
+        "quadratic_drag" => "drag",
+        "hysteresis" => "loop_force",
+        "load_step" => "load",
+        "cogging" => "cogging_force",
+        "direction_dependent_friction" => "friction_difference",
+        "end_stop" => "stop_stiffness",
+        "stiffness_change" => "stiffness_change",
+        "position_dependent_gain" => "gain_per_position",
+        _ => "stiffness",
+    }
+}
+
+/// Its unit, from those of the input and of the output; `integral`: the output is a rate.
+pub(crate) fn amplitude_unit(id: &str, input: &str, output: &str, integral: bool) -> String {
+    let per = match id {
+        "cubic_stiffness" => 3,
+        "quadratic_stiffness" | "quadratic_drag" => 2,
+        "end_stop" | "stiffness_change" | "position_dependent_gain" => 1,
+        "direction_dependent_friction" => 1,
+        _ => 0,
+    };
+    let rate = if integral {
+        output.to_owned()
+    } else {
+        format!("{output}/s")
+    };
+    match (input.is_empty() || output.is_empty(), per, id) {
+        (_, 0, _) => input.to_owned(),
+        (true, ..) => String::new(),
+        (false, 1, "direction_dependent_friction") => format!("{input}/({rate})"),
+        (false, 1, _) => format!("{input}/({output})"),
+        (false, p, "quadratic_drag") => format!("{input}/({rate})^{p}"),
+        (false, p, _) => format!("{input}/({output})^{p}"),
+    }
+}
+
+pub(crate) fn port_name(port: Port) -> &'static str {
     match port {
         Port::Input => "input",
         Port::Force => "force",

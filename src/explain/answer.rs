@@ -16,6 +16,7 @@ use super::noise::Mask;
 use super::probability::probability;
 use super::prove;
 use super::simulation::{Known, Simulation, know};
+use super::weak;
 use super::words;
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
@@ -48,6 +49,16 @@ pub fn explain(
     }
     let known = know(recordings, simulation)?;
     let allowed = |d: &Definition| !options.without.iter().any(|id| id == d.id);
+    if let Some((known, finding, mask)) = weak::attempt(recordings, &known, &allowed) {
+        return Ok(Answer {
+            recordings,
+            known: &known,
+            finding: &finding,
+            mask,
+            seed: options.seed,
+        }
+        .say());
+    }
     let (finding, mask) =
         inquire(&known.data, &known.structure, &allowed).ok_or_else(|| ExplainError::NoFit {
             name: recordings[0].name.clone(),
@@ -104,7 +115,10 @@ impl Answer<'_> {
         let shown = self.output_that_shows(boring, model);
         let (input_names, output_names) = self.names();
         let squares = locate::excess(&boring.residual, &model.noise);
-        let effects = self.effects(&problem, model);
+        let effects = match &finding.weak {
+            Some(proof) => self.drive_effects(proof),
+            None => self.effects(&problem, model),
+        };
         let (fit, effect_size, heldout_gain) = self.proof(&problem, boring, model, shown);
         let mut effects = effects;
         if let Some(first) = effects.first_mut() {
@@ -139,7 +153,10 @@ impl Answer<'_> {
                 self.data().constant,
             )));
         }
-        let curve = (verdict == Verdict::Unexplained)
+        if let Some(proof) = &finding.weak {
+            augmented.mechanics = Some(self.mechanics(proof));
+        }
+        let curve = (verdict == Verdict::Unexplained && finding.weak.is_none())
             .then(|| curve::learn(&problem, boring, &input_names, &output_names))
             .flatten();
         let mut explanation = Explanation {
@@ -156,7 +173,10 @@ impl Answer<'_> {
             location,
             fit,
             parameters: self.parameter_changes(boring),
-            remaining: self.remaining(&problem, model),
+            remaining: match &finding.weak {
+                Some(proof) => proof.remaining(),
+                None => self.remaining(&problem, model),
+            },
             separating_experiment,
             effect_size,
             detectable: self.detectable(verdict),
@@ -177,6 +197,12 @@ impl Answer<'_> {
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };
         explanation.summary = words::summary(&explanation, NEEDED);
+        if let (Some(mechanics), true) = (
+            &explanation.model.mechanics,
+            matches!(verdict, Verdict::Parameters | Verdict::Unexplained),
+        ) {
+            explanation.summary.insert(1, mechanics.sentence.clone());
+        }
         explanation
     }
 
@@ -226,10 +252,13 @@ impl Answer<'_> {
         };
         let train = prove::steps(data, &train_steps, &self.mask, shown, None);
         let (train_mask, test_mask) = prove::split(data, &self.mask);
-        let (refit_parameters, refit_model) = rayon::join(
-            || prove::refit(problem, parameters, &train_mask),
-            || prove::refit(problem, model, &train_mask),
-        );
+        let (refit_parameters, refit_model) = match &self.finding.weak {
+            Some(proof) => proof.heldout.clone().unzip(),
+            None => rayon::join(
+                || prove::refit(problem, parameters, &train_mask),
+                || prove::refit(problem, model, &train_mask),
+            ),
+        };
         let heldout = match (&refit_parameters, &refit_model) {
             (Some(p), Some(m)) => Some(prove::steps(
                 data,
@@ -246,6 +275,11 @@ impl Answer<'_> {
             _ => None,
         };
         let heldout_gain = match (&refit_parameters, &refit_model) {
+            _ if self.finding.weak.is_some() => self
+                .finding
+                .weak
+                .as_ref()
+                .and_then(|proof| proof.heldout_gain),
             (Some(p), Some(m)) => Some(
                 p.noise.deviance(&p.residual, &test_mask)
                     - m.noise.deviance(&m.residual, &test_mask),

@@ -100,6 +100,7 @@ impl AugmentedModel {
             effects,
             substeps: structure.substeps,
             initial_state_prior: None,
+            mechanics: None,
             reference: None,
         }
     }

@@ -407,8 +407,31 @@ pub struct AugmentedModel {
     /// (the recorded one last), and `A`, `B`, `C`, `D` are what the tanks do near their mean levels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initial_state_prior: Option<StatePrior>,
+    /// The same plant as an equation of motion, where it is a mass that the input moves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mechanics: Option<Mechanics>,
     /// What stood for a simulator that is known by its outputs alone: its answer to a new input is corrected by the
     /// difference of the two models.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference: Option<Box<AugmentedModel>>,
+}
+
+/// A mass that the input moves: `u = mass a + viscous_friction v + constant_force [+ stiffness x] + effects`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Mechanics {
+    /// What the output is: `position` or `velocity`.
+    pub reading: String,
+    /// Mass, or inertia of a rotating drive: input over acceleration.
+    pub mass: Quantity,
+    /// Viscous friction: input over velocity.
+    pub viscous_friction: Quantity,
+    /// Force that acts all the time, against the input.
+    pub constant_force: Quantity,
+    /// Stiffness of a spring to the position 0, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness: Option<Quantity>,
+    /// Length of the windows that the equation was averaged over, in seconds.
+    pub window: f64,
+    /// In words.
+    pub sentence: String,
 }

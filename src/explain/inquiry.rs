@@ -61,6 +61,8 @@ pub(crate) struct Finding {
     pub count: usize,
     /// What effects that were not found would have had to be: size in the output over its standard deviation.
     pub detectable: Vec<(&'static Definition, super::structure::Instance, f64)>,
+    /// What was decided by the averaged equation of motion.
+    pub weak: Option<Box<super::weak::Proof>>,
 }
 
 /// Runs the whole inquiry. `structure` is the simulation as it is known.
@@ -83,7 +85,11 @@ pub(crate) fn inquire(
         mask[freeze.from + 1..to].fill(false);
     }
     let count = problem.count();
-    let boring = Boring::fit(&problem, structure)?;
+    let mut boring = Boring::fit(&problem, structure)?;
+    // An identified baseline never asked for a direct feedthrough: without it any law makes up for it.
+    if let Some(direct) = with_feedthrough(&problem, &boring.full) {
+        boring.full = direct;
+    }
     let base = boring.best(count).criterion(count);
     let coarse = if allowed(effects::find("sensor_quantization", "")?) {
         coarse_sensor(&problem, boring.best(count))
@@ -102,6 +108,7 @@ pub(crate) fn inquire(
         adequacy: None,
         count,
         detectable: Vec::new(),
+        weak: None,
     };
     let dominated = coarse.is_some_and(|(_, _, share)| share > 0.5);
     if dominated || coarse.is_some_and(|c| c.2 > 0.3) {
@@ -181,7 +188,7 @@ pub(crate) fn inquire(
         let second = if nothing_left || other_class {
             None
         } else {
-            pair(&problem, &ranked_all, base, allowed)
+            pair(&problem, &ranked_all, finding.boring.best(count), allowed)
         };
         if let Some(pair) = second {
             gain = gain.max(base - pair.criterion(count));

@@ -18,6 +18,7 @@
 //! | `screen`, `templates`, `features` | one Gauss-Newton step for everything |
 //! | `cascade`, `tanks`, `rectified` | plants of another class, which no effect added to the linear one becomes |
 //! | `search`, `refine`, `plausible`, `second`, `inquiry` | the fits, what is kept of them, the decision |
+//! | `weak` | drives: the averaged equation of motion, where a free run cannot tell |
 //! | `exact`, `adequacy` | tests without fits, and of what is left |
 //! | `locate`, `curve`, `prove`, `probability` | where, the law without a form, held-out blocks, how sure |
 //! | `answer`, `account`, `words`, `explanation`, `augmented`, `start` | what is said, and the model that can be run |
@@ -59,6 +60,7 @@ mod start;
 mod structure;
 mod tanks;
 mod templates;
+mod weak;
 mod words;
 
 pub use answer::{Options, explain};
@@ -66,8 +68,8 @@ pub use augmented::AugmentedError;
 pub use error::ExplainError;
 pub use explanation::{
     Alternative, AugmentedModel, Curve, Detectable, EXPLANATION_FORMAT, EffectFound, EffectSize,
-    Evidence, Explanation, FitFigure, FitSteps, FitTable, Location, ModelEffect, NoiseFound,
-    ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces, StatePrior,
-    Verdict,
+    Evidence, Explanation, FitFigure, FitSteps, FitTable, Location, Mechanics, ModelEffect,
+    NoiseFound, ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces,
+    StatePrior, Verdict,
 };
 pub use simulation::Simulation;

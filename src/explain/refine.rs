@@ -28,6 +28,8 @@ pub(crate) enum More {
     Samples(&'static [f64]),
     /// Shares of the travel.
     Travel(&'static [f64]),
+    /// Plain numbers.
+    Plain(&'static [f64]),
 }
 
 pub(crate) const REFINEMENTS: &[Refinement] = &[
@@ -70,6 +72,12 @@ pub(crate) const REFINEMENTS: &[Refinement] = &[
         simple: ("end_stop", "both"),
         rich: ("end_stop", "both damped"),
         more: More::Samples(&[0.5]),
+    },
+    Refinement {
+        simple: ("cubic_stiffness", ""),
+        rich: ("cubic_stiffness", "off centre"),
+        // Where the simple one is: about zero, in the middle of the interval.
+        more: More::Plain(&[0.0, 0.5]),
     },
     Refinement {
         simple: ("input_delay", ""),
@@ -152,6 +160,7 @@ pub(crate) fn derived(
         }
         let starts: Vec<Vec<f64>> = match &refinement.more {
             More::Nothing => vec![vec![]],
+            More::Plain(numbers) => vec![numbers.to_vec()],
             More::Numbers(numbers) => numbers.iter().map(|v| vec![v.ln()]).collect(),
             More::Samples(samples) => samples
                 .iter()

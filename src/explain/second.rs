@@ -17,14 +17,34 @@ pub(crate) const SECOND_SHARE: f64 = 0.1;
 /// ... and at least this much.
 pub(crate) const SECOND_GAIN: f64 = 30.0;
 
-/// A second effect beside one of the two best singles, where the best single leaves something.
+/// ... and it must remove this share of the squared error that the first has removed, unweighted: a textbook law is
+/// rarely closer to the real one than some percents (seven percents are half a percent of its square), and with little
+/// noise what is left of it is evidence for whatever comes near.
+const SECOND_VARIANCE: f64 = 0.005;
+
+/// Mean square error over the samples that count, each output on its own scale.
+fn mean_square(problem: &Problem, residual: &Series) -> f64 {
+    let (mut sum, mut n) = (0.0, 0usize);
+    for (s, (r, m)) in residual.iter().zip(&problem.mask).enumerate() {
+        let scale = problem.scale[s % problem.scale.len()];
+        for (r, _) in r.iter().zip(m).filter(|(_, keep)| **keep) {
+            sum += (r / scale).powi(2);
+            n += 1;
+        }
+    }
+    sum / n.max(1) as f64
+}
+
+/// A second effect beside one of the two best singles, where the best single leaves something; `before` is the best
+/// explanation without any.
 pub(crate) fn pair(
     problem: &Problem,
     ranked: &[Ranked],
-    base: f64,
+    before: &Fit,
     allowed: &(dyn Fn(&Definition) -> bool + Sync),
 ) -> Option<Fit> {
     let count = problem.count();
+    let base = before.criterion(count);
     let mut ranked = ranked.to_vec();
     ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     let best = ranked.first()?;
@@ -77,12 +97,16 @@ pub(crate) fn pair(
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
     let gain = best.criterion - found.criterion;
     let enough = gain > SECOND_GAIN.max(SECOND_SHARE * single_gain);
+    let size = |fit: &Fit| mean_square(problem, &fit.residual);
+    let (without, single, both) = (size(before), size(&best.fit), size(&found.fit));
+    // Beside a plant that is free otherwise the first may have removed nothing of it.
+    let shows = single - both >= SECOND_VARIANCE * (without - single).max(0.0);
     // Blocks that were not fitted make up a share of the recording: a real gain shows there in proportion.
     let seen_again = || {
         heldout_gain(problem, &best.fit, &found.fit)
             .is_some_and(|held| held > 0.5 * super::prove::SHARE * gain)
     };
-    (enough && seen_again()).then_some(found.fit)
+    (enough && shows && seen_again()).then_some(found.fit)
 }
 
 /// What a feedthrough must gain to be believed (strong evidence, Kass and Raftery 1995).
@@ -181,7 +205,7 @@ const KINDS: &[&[&str]] = &[
     &["gain_change", "stiffness_change"],
 ];
 
-fn look_alikes(a: &str, b: &str) -> bool {
+pub(crate) fn look_alikes(a: &str, b: &str) -> bool {
     KINDS
         .iter()
         .any(|kind| kind.contains(&a) && kind.contains(&b))

@@ -38,7 +38,11 @@ impl AugmentedModel {
         inputs: &[&[f64]],
         outputs: &[&[f64]],
     ) -> Result<Vec<f64>, AugmentedError> {
-        let samples = inputs.first().map_or(0, |u| u.len()).min(INITIAL_SAMPLES);
+        // A drive integrates: over a longer stretch the start would make up for whatever the model misses.
+        let most = self.mechanics.as_ref().map_or(INITIAL_SAMPLES, |m| {
+            (m.window / self.sample_time).ceil() as usize + 1
+        });
+        let samples = inputs.first().map_or(0, |u| u.len()).min(most);
         let inputs: Vec<&[f64]> = inputs.iter().map(|u| &u[..samples]).collect();
         let l = self.outputs.len();
         let scale: Vec<f64> = outputs.iter().map(|y| deviation(&y[..samples])).collect();

@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use super::data::Data;
 use super::error::IdentifyError;
 use super::finish::{Chosen, finish};
+use super::free_run::low_order;
 use super::horizon;
 use super::options::{Options, Order};
 use super::records::Records;
@@ -63,6 +64,19 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
         None => choose_past(&data, records, options, &mut explanation)?,
     };
     let mut chosen = windowed(&data, records, past, options)?;
+    // A plant that is not linear, recorded with little noise, has no linear order: its free run decides.
+    let low = low_order(&chosen, &data, records, options, sample_time)?;
+    let narrowed = Options {
+        order: low
+            .as_ref()
+            .map_or_else(|| options.order.clone(), |low| Order::Fixed(low.order)),
+        ..options.clone()
+    };
+    let final_options = Options {
+        stable: options.stable || low.as_ref().is_some_and(|low| low.unstable),
+        ..options.clone()
+    };
+    let options = &narrowed;
     // While the past window is too short the tests of the order have no meaning: they wait until it is chosen.
     let mut selection = if options.past.is_none() {
         propose(&chosen, options, sample_time)?
@@ -103,8 +117,11 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
         }
         selection = select(&chosen, options, sample_time)?;
     }
+    if let Some(low) = low {
+        selection.explanation = low.explanation;
+    }
     finish(
-        options,
+        &final_options,
         &data,
         Chosen {
             windowed: chosen,

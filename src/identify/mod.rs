@@ -9,6 +9,7 @@
 //! | `varx` | the high-order vector ARX model | van Wingerden (22)-(23) |
 //! | `pbsid_opt` | states by a weighted singular value decomposition, system matrices by least squares | van Wingerden (24)-(34) |
 //! | `order`, `select` | which order: singular values propose, a chi-square test referees | Bauer 2001 |
+//! | `free_run` | the order of a plant that is not linear: by its free run | |
 //! | `truncation` | what the past window cuts off | |
 //! | `polish` | the maximum-likelihood model of that order | Soderstrom, Stoica & Friedlander 1991 |
 //! | `stable` | a stable model, guaranteed | |
@@ -24,6 +25,7 @@ mod delay;
 mod error;
 mod finish;
 mod fit;
+mod free_run;
 mod horizon;
 mod model;
 mod options;

@@ -210,7 +210,8 @@ impl Estimator<'_> {
     }
 }
 
-fn automatic_weight(factor: &RFactor, varx: &Varx) -> Weight {
+/// The weight of the decomposition where none is asked for.
+pub(super) fn automatic_weight(factor: &RFactor, varx: &Varx) -> Weight {
     let sizes: Vec<f64> = varx
         .innovation_covariance
         .diagonal()

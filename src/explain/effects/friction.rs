@@ -146,6 +146,22 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: |_| Vec::new(),
     },
     Definition {
+        id: "direction_dependent_friction",
+        variant: "",
+        name: "viscous friction that depends on the direction",
+        equation: "F = -b |v|",
+        parameters: &[],
+        mimics: &[Mimic {
+            effect: "input_asymmetry",
+            experiment: "a constant velocity each way, at two loads: an asymmetric actuator scales with the load, friction does not",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Force(one_way_drag, Needs::Rate, Sense::Either),
+        // Hardly seen in free run beside a constant load: only the averaged equation of motion asks for it.
+        starts: |_| Vec::new(),
+    },
+    Definition {
         id: "quadratic_drag",
         variant: "",
         name: "quadratic drag",
@@ -274,6 +290,10 @@ fn bristle_force(
 fn stribeck(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     let slow = motion.middle_rate() / p[1];
     motion.stopping_force(1.0 + p[0] * (-slow * slow).exp())
+}
+
+fn one_way_drag(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    -motion.middle_rate().abs()
 }
 
 fn drag(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {

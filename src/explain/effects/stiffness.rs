@@ -19,6 +19,25 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: no_shape,
     },
     Definition {
+        id: "cubic_stiffness",
+        variant: "off centre",
+        name: "cubic stiffness",
+        equation: "F = -k3 (x - centre)^3, x at this instant of the sample interval",
+        parameters: &[
+            Parameter::real("centre", Unit::Position),
+            Parameter::between("instant", Unit::Ratio, 0.0, 1.0),
+        ],
+        mimics: &[Mimic {
+            effect: "end_stop",
+            experiment: "a slow ramp over the whole travel: a stop has a corner, a cubic spring has none",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Force(cubic_off_centre, Needs::Position, Sense::Either),
+        // Grows out of the one about zero.
+        starts: |_| Vec::new(),
+    },
+    Definition {
         id: "quadratic_stiffness",
         variant: "odd",
         name: "quadratic stiffness x|x|",
@@ -154,6 +173,25 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: yield_distances,
     },
     Definition {
+        id: "cogging",
+        variant: "",
+        name: "force that repeats with the position (cogging)",
+        equation: "F = -Fa sin(2 pi x/pitch + phase)",
+        parameters: &[
+            Parameter::positive("pitch", Unit::Position),
+            Parameter::real("phase", Unit::Radian),
+        ],
+        mimics: &[Mimic {
+            effect: "periodic_disturbance",
+            experiment: "the same travel at twice the speed: cogging keeps its places, a disturbance keeps its times",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Force(cogging, Needs::Position, Sense::Either),
+        // Many periods in a travel: only the averaged equation of motion finds the pitch.
+        starts: |_| Vec::new(),
+    },
+    Definition {
         id: "position_dependent_gain",
         variant: "",
         name: "gain that depends on position",
@@ -193,6 +231,13 @@ fn cubic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     -x * x * x
 }
 
+/// About its own centre; and taken at a fitted instant of the sample interval, because a force that is held over the
+/// interval stands for one that moves in it, which matters when an oscillation has few samples.
+fn cubic_off_centre(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    let x = motion.position + p[1] * (motion.position_free - motion.position) - p[0];
+    -x * x * x
+}
+
 fn odd_quadratic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     let x = motion.middle();
     -x * x.abs()
@@ -201,6 +246,10 @@ fn odd_quadratic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
 fn even_quadratic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     let x = motion.middle();
     -x * x
+}
+
+fn cogging(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    -(std::f64::consts::TAU * motion.middle() / p[0] + p[1]).sin()
 }
 
 fn input_times_position(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {

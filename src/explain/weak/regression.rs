@@ -1,0 +1,126 @@
+//! Linear least squares over windows whose errors are correlated.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::linalg::multiply_tn;
+
+/// Lags over which the correlation of the errors is summed, as a share of the windows.
+const LAGS_SHARE: usize = 4;
+
+/// `target = columns c + error`.
+#[derive(Debug, Clone)]
+pub(crate) struct Regression {
+    pub coefficients: DVector<f64>,
+    /// Inverse of the Gram matrix.
+    pub inverse: DMatrix<f64>,
+    pub residual: Vec<f64>,
+    /// Sum of squared errors.
+    pub squares: f64,
+}
+
+impl Regression {
+    /// Least squares; `None` where the columns are dependent.
+    pub fn new(columns: &[&[f64]], target: &[f64]) -> Option<Self> {
+        let (n, m) = (target.len(), columns.len());
+        if n <= m {
+            return None;
+        }
+        let scale: Vec<f64> = columns
+            .iter()
+            .map(|c| c.iter().map(|v| v * v).sum::<f64>().sqrt())
+            .collect();
+        if scale.iter().any(|s| !(*s > 0.0 && s.is_finite())) {
+            return None;
+        }
+        let x = DMatrix::from_fn(n, m, |i, j| columns[j][i] / scale[j]);
+        let gram = multiply_tn(&x, &x);
+        // Dependent to half the digits: the normal equations have no more.
+        let smallest = gram.symmetric_eigenvalues().min();
+        if smallest < 1e-9 {
+            return None;
+        }
+        let inverse = gram.cholesky()?.inverse();
+        let t = DVector::from_column_slice(target);
+        let scaled = &inverse * x.tr_mul(&t);
+        let residual: Vec<f64> = (&t - &x * &scaled).iter().copied().collect();
+        Some(Self {
+            coefficients: DVector::from_fn(m, |i, _| scaled[i] / scale[i]),
+            inverse: DMatrix::from_fn(m, m, |i, j| inverse[(i, j)] / (scale[i] * scale[j])),
+            squares: residual.iter().map(|r| r * r).sum(),
+            residual,
+        })
+    }
+
+    /// Number of independent windows that the errors amount to: `N / sum rho^2` (Bartlett 1946).
+    pub fn effective(&self) -> f64 {
+        effective(&self.residual)
+    }
+
+    /// Sum of squared errors of the motion: over the square of the first coefficient, which is the mass. Laws that change
+    /// the input change what the errors of the force are measured in; those of the acceleration stay the same.
+    pub fn motion_squares(&self) -> f64 {
+        self.squares / self.coefficients[0].powi(2).max(1e-300)
+    }
+
+    /// Covariance of the coefficients, with as many windows as are independent.
+    pub fn covariance(&self) -> DMatrix<f64> {
+        let n = self.residual.len() as f64;
+        let free = (n - self.coefficients.len() as f64).max(1.0);
+        &self.inverse * (self.squares / free * (n / self.effective()).max(1.0))
+    }
+}
+
+/// `N / sum rho^2` of a series; the share that chance adds to the sum is taken off.
+pub(crate) fn effective(series: &[f64]) -> f64 {
+    let n = series.len();
+    let mean = series.iter().sum::<f64>() / n.max(1) as f64;
+    let e: Vec<f64> = series.iter().map(|v| v - mean).collect();
+    let variance: f64 = e.iter().map(|v| v * v).sum();
+    if n < 4 || variance <= 0.0 {
+        return n as f64;
+    }
+    let sum: f64 = (1..n / LAGS_SHARE)
+        .map(|lag| {
+            let r = e.iter().zip(&e[lag..]).map(|(a, b)| a * b).sum::<f64>() / variance;
+            r * r - 1.0 / n as f64
+        })
+        .sum();
+    n as f64 / (1.0 + 2.0 * sum.max(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+
+    #[test]
+    fn correlated_series_have_fewer_independent_values() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let mut white = || random.random::<f64>() - 0.5;
+        let n = 4000;
+        let e: Vec<f64> = (0..n).map(|_| white()).collect();
+        assert!((effective(&e) / n as f64 - 1.0).abs() < 0.2);
+        // An autoregression with coefficient a: sum rho^2 = (1 + a^2)/(1 - a^2).
+        let a = 0.9;
+        let mut state = 0.0;
+        let v: Vec<f64> = e
+            .iter()
+            .map(|e| {
+                state = a * state + e;
+                state
+            })
+            .collect();
+        let expected = n as f64 * (1.0 - a * a) / (1.0 + a * a);
+        assert!((effective(&v) / expected - 1.0).abs() < 0.3);
+    }
+
+    #[test]
+    fn dependent_columns_are_refused() {
+        let a: Vec<f64> = (0..50).map(f64::from).collect();
+        let b: Vec<f64> = a.iter().map(|v| 2.0 * v).collect();
+        assert!(Regression::new(&[&a, &b], &a).is_none());
+        let one = vec![1.0; 50];
+        let fit = Regression::new(&[&a, &one], &b).unwrap();
+        assert!((fit.coefficients[0] - 2.0).abs() < 1e-12 && fit.coefficients[1].abs() < 1e-10);
+    }
+}

@@ -1,0 +1,242 @@
+//! A drive in words: laws, mass and friction with their uncertainty.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
+
+use super::super::account::{amplitude_name, amplitude_unit, port_name};
+use super::super::answer::Answer;
+use super::super::explanation::{EffectFound, Evidence, Mechanics, Quantity, Remaining};
+use super::super::inquiry::NEEDED;
+use super::super::words;
+use super::inquiry::Proof;
+use super::windows::Reading;
+
+/// Units of angles: what they move is an inertia.
+const ANGLES: &[&str] = &["rad", "deg", "rev", "turn", "turns"];
+
+impl Proof {
+    fn std(&self, i: usize) -> Option<f64> {
+        Some(self.tethered.covariance[(i, i)].max(0.0).sqrt())
+    }
+
+    /// What is left of the force.
+    pub(crate) fn remaining(&self) -> Remaining {
+        let Some(a) = self.adequacy else {
+            return Remaining {
+                adequate: true,
+                p_value: 1.0,
+                share: 0.0,
+                share_of_removed: None,
+                features: 0,
+                sentence: "The recording is too short to test what is left of the force."
+                    .to_owned(),
+            };
+        };
+        let sentence = if a.p_value > super::super::adequacy::LEVEL {
+            format!(
+                "What is left of the force is noise to {} flexible features (p = {:.2}).",
+                a.features, a.p_value
+            )
+        } else if self.adequate {
+            let resembles = self.resembles.map_or_else(String::new, |(law, gain)| {
+                format!(
+                    " It resembles {} (evidence {}).",
+                    law.name,
+                    words::number(gain)
+                )
+            });
+            format!(
+                "{:.0} % of what is left of the force is structure still: real, but {:.1} % of what was found.{resembles}",
+                100.0 * a.share,
+                100.0 * a.of_removed
+            )
+        } else {
+            format!(
+                "{:.0} % of what is left of the force is structure (p = {:.0e}).",
+                100.0 * a.share,
+                a.p_value
+            )
+        };
+        Remaining {
+            adequate: self.adequate,
+            p_value: a.p_value,
+            share: a.share,
+            share_of_removed: Some(a.of_removed),
+            features: a.features,
+            sentence,
+        }
+    }
+}
+
+impl Answer<'_> {
+    /// Mass, friction and constant force.
+    pub(crate) fn mechanics(&self, proof: &Proof) -> Mechanics {
+        let c = &proof.tethered.coefficients;
+        let side = c[0].signum();
+        let units = Units::new(self, proof.equation.reading);
+        let quantity = |i: usize, unit: &str| Quantity {
+            value: side * c[i],
+            std: proof.std(i),
+            unit: unit.to_owned(),
+        };
+        let (mass, viscous, constant) = (
+            quantity(0, &units.mass),
+            quantity(1, &units.viscous),
+            quantity(2, &units.force),
+        );
+        let stiffness = proof.equation.spring.then(|| quantity(3, &units.stiffness));
+        let spring = stiffness.as_ref().map_or_else(String::new, |k| {
+            format!(", stiffness {}", words::quantity(k))
+        });
+        let wired = if side < 0.0 {
+            " The input pushes backwards."
+        } else {
+            ""
+        };
+        let sentence = format!(
+            "{} {}, viscous friction {}{spring}, constant force {}.{wired}",
+            if units.rotates { "Inertia" } else { "Mass" },
+            words::quantity(&mass),
+            words::quantity(&viscous),
+            words::quantity(&constant),
+        );
+        Mechanics {
+            reading: match proof.equation.reading {
+                Reading::Position => "position",
+                Reading::Velocity => "velocity",
+            }
+            .to_owned(),
+            mass,
+            viscous_friction: viscous,
+            constant_force: constant,
+            stiffness,
+            window: 2.0 * proof.half as f64 * self.data().sample_time,
+            sentence,
+        }
+    }
+
+    /// The laws that were found.
+    pub(crate) fn drive_effects(&self, proof: &Proof) -> Vec<EffectFound> {
+        let (input, output) = (&self.inputs()[0], &self.outputs()[0]);
+        let integral = proof.equation.reading == Reading::Velocity;
+        let c = &proof.tethered.coefficients;
+        let side = c[0].signum();
+        let text = |unit: &Option<String>| unit.clone().unwrap_or_default();
+        let mut found = Vec::new();
+        for ((form, shape), (at, count)) in
+            proof.equation.laws.iter().zip(proof.equation.places(false))
+        {
+            let definition = form.definition;
+            let own = &c[at..at + count];
+            let (amplitude, numbers) = form.numbers(own, *shape);
+            let mut parameters = BTreeMap::new();
+            // Standard deviation of a function of the coefficients, by its gradient.
+            let std = |of: &dyn Fn(&[f64]) -> f64| -> Option<f64> {
+                let here = of(own);
+                let gradient = DVector::from_fn(count, |i, _| {
+                    let step = 1e-4 * proof.std(at + i).unwrap_or(0.0).max(1e-300);
+                    let mut moved = own.to_vec();
+                    moved[i] += step;
+                    (of(&moved) - here) / step
+                });
+                let block = proof.tethered.covariance.view((at, at), (count, count));
+                let variance = (gradient.transpose() * block * &gradient)[(0, 0)];
+                (variance > 0.0).then(|| variance.sqrt())
+            };
+            if !form.on_input() {
+                parameters.insert(
+                    amplitude_name(definition.id).to_owned(),
+                    Quantity {
+                        value: side * amplitude,
+                        std: std(&|own| form.numbers(own, *shape).0),
+                        unit: amplitude_unit(
+                            definition.id,
+                            &text(&input.unit),
+                            &text(&output.unit),
+                            integral,
+                        ),
+                    },
+                );
+            }
+            for (i, (p, value)) in definition.parameters.iter().zip(&numbers).enumerate() {
+                parameters.insert(
+                    p.name.to_owned(),
+                    Quantity {
+                        value: *value,
+                        std: std(&|own| form.numbers(own, *shape).1[i]),
+                        unit: words::unit_text(p.unit, input, output, integral),
+                    },
+                );
+            }
+            let mut effect = EffectFound {
+                effect: definition.id.to_owned(),
+                variant: definition.variant.to_owned(),
+                signal: if form.on_input() {
+                    input.name.clone()
+                } else {
+                    output.name.clone()
+                },
+                port: port_name(definition.port()).to_owned(),
+                equation: definition.equation.to_owned(),
+                parameters,
+                evidence: Evidence {
+                    criterion_gain: self.finding.gain,
+                    criterion_needed: NEEDED,
+                    heldout_gain: None,
+                    halves_disagree: proof.halves_disagree,
+                },
+                sentence: String::new(),
+            };
+            effect.sentence = words::sentence(definition, &effect);
+            found.push(effect);
+        }
+        if let Some(first) = found.first_mut() {
+            first.sentence = format!("{} {}", first.sentence, self.mechanics(proof).sentence);
+        }
+        found
+    }
+}
+
+/// Units of the equation of motion, empty where the channels have none.
+struct Units {
+    rotates: bool,
+    force: String,
+    mass: String,
+    viscous: String,
+    stiffness: String,
+}
+
+impl Units {
+    fn new(answer: &Answer, reading: Reading) -> Self {
+        let force = answer.inputs()[0].unit.clone().unwrap_or_default();
+        let read = answer.outputs()[0].unit.clone().unwrap_or_default();
+        let travel = match reading {
+            Reading::Position => read,
+            // What is a rate is a travel per second, whatever it is called.
+            Reading::Velocity => match read.strip_suffix("/s") {
+                Some(travel) => travel.to_owned(),
+                None if read.is_empty() => String::new(),
+                None => format!("{read} s"),
+            },
+        };
+        let rotates = ANGLES.contains(&travel.as_str());
+        let torque = ["N m", "Nm", "N*m"].contains(&force.as_str());
+        let known = !force.is_empty() && !travel.is_empty();
+        let per = |what: &str| match known {
+            true => format!("{force} {what}/{travel}").replace("  ", " "),
+            false => String::new(),
+        };
+        Self {
+            mass: match (force.as_str(), travel.as_str()) {
+                ("N", "m") => "kg".to_owned(),
+                (_, "rad") if torque => "kg m^2".to_owned(),
+                _ => per("s^2"),
+            },
+            viscous: per("s"),
+            stiffness: per(""),
+            rotates,
+            force,
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! The order of a recording that no linear model explains: by its free run.
+//!
+//! A recording with little noise of a plant that is not linear has no linear order: every further state follows the
+//! nonlinear part of the motion a little better, and the evidence for it is beyond doubt, because noise is what
+//! evidence is measured against. The singular values then hardly end, and a test against noise accepts nothing. What a
+//! linear model can give there is the best linear approximation of the plant, and how good it is shows in free run: its
+//! error is the nonlinear part, which is strongly correlated in time and so is worth far fewer samples than there are
+//! (Bartlett 1946). By Schwarz's criterion with that many samples, states that only follow the nonlinear part do not pay.
+
+use nalgebra::DVector;
+
+use super::candidate::Window;
+use super::data::Data;
+use super::delay::Aligner;
+use super::error::IdentifyError;
+use super::horizon;
+use super::options::{Options, Order};
+use super::order;
+use super::pbsid_opt::{Weight, decompose};
+use super::polish::Effort;
+use super::records::Records;
+use super::select::{Windowed, automatic_weight};
+use super::stable::{largest_stable_radius, with_poles_inside};
+use crate::linalg::spectral_radius;
+use crate::model::StateSpace;
+
+/// Orders that are run.
+const ORDERS: [usize; 15] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 15, 20, 25, 30];
+/// From this proposal of the singular values on the free run is asked: plants of so many states are rare, and plants
+/// that are not linear are not.
+const MANY: usize = 15;
+/// The free run overrules the singular values where it asks for this share of their order at most; else they were
+/// right.
+const FEW: f64 = 0.5;
+/// Samples that are run, at most.
+const LONGEST_RUN: usize = 200_000;
+/// Lags over which the correlation of the error is summed.
+const LAGS: usize = 500;
+
+/// What the free runs say.
+#[derive(Debug, Clone)]
+pub struct LowOrder {
+    /// The order.
+    pub order: usize,
+    /// Whether the model had to be made stable to be run.
+    pub unstable: bool,
+    /// Why.
+    pub explanation: String,
+}
+
+/// The order by free run, when the singular values ask for many states; `None` when they do not, or when the free run
+/// asks for many as well.
+///
+/// # Errors
+/// When reading the recordings again fails, or the decomposition.
+pub fn low_order(
+    windowed: &Windowed,
+    data: &Data,
+    records: &mut dyn Records,
+    options: &Options,
+    sample_time: f64,
+) -> Result<Option<LowOrder>, IdentifyError> {
+    let Windowed { factor, varx } = windowed;
+    if !matches!(options.order, Order::Auto) {
+        return Ok(None);
+    }
+    let proposal = proposal(windowed, options)?;
+    if proposal < MANY {
+        return Ok(None);
+    }
+    let weight = options
+        .weight
+        .unwrap_or_else(|| automatic_weight(factor, varx));
+    let window = Window {
+        factor,
+        varx,
+        sample_time,
+        polish: false,
+        effort: Effort::Referee,
+    };
+    let radius = largest_stable_radius(varx.columns);
+    let mut systems: Vec<(usize, StateSpace, bool)> = Vec::new();
+    let future = horizon::future_for_order(factor.past, factor.outputs, ORDERS[0]);
+    let decomposition = decompose(factor, varx, future, weight)?;
+    for order in ORDERS {
+        if order > decomposition.largest_order() {
+            break;
+        }
+        let Ok(candidate) = window.candidate(&decomposition, order) else {
+            continue;
+        };
+        let system = candidate.estimate.system;
+        let unstable = spectral_radius(&system.a)? > radius;
+        let system = if unstable {
+            match with_poles_inside(&system, radius) {
+                Ok(inside) => inside,
+                Err(_) => continue,
+            }
+        } else {
+            system
+        };
+        systems.push((order, system, unstable));
+    }
+    let errors = free_runs(&systems, data, records)?;
+    let size = |e: &Vec<Vec<f64>>| -> f64 { e.iter().flatten().map(|v| v * v).sum() };
+    let Some((_, least)) = errors
+        .iter()
+        .map(|e| (size(e), e))
+        .filter(|(s, _)| s.is_finite())
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+    else {
+        return Ok(None);
+    };
+    let independent: f64 = least.iter().map(|e| effective(e)).sum::<f64>().max(2.0);
+    let parameters = |n: usize| (n * (factor.inputs + factor.outputs)) as f64;
+    let best = systems
+        .iter()
+        .zip(&errors)
+        .map(|((order, _, unstable), e)| {
+            let criterion = independent * size(e).ln() + parameters(*order) * independent.ln();
+            (criterion, *order, *unstable)
+        })
+        .filter(|(criterion, ..)| criterion.is_finite())
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((_, order, unstable)) = best.filter(|b| b.1 as f64 <= FEW * proposal as f64) else {
+        return Ok(None);
+    };
+    Ok(Some(LowOrder {
+        order,
+        unstable,
+        explanation: format!(
+            "order {order}: the singular values ask for {proposal}, as they do for a plant that is not linear; of orders \
+             1 to {} the free run asks for this one (its error is worth {independent:.0} independent samples)",
+            systems.last().map_or(order, |s| s.0)
+        ),
+    }))
+}
+
+/// The order that the singular value criterion proposes.
+fn proposal(windowed: &Windowed, options: &Options) -> Result<usize, IdentifyError> {
+    let Windowed { factor, varx } = windowed;
+    let largest = order::LARGEST_AUTOMATIC_ORDER;
+    let future = options
+        .future
+        .unwrap_or_else(|| horizon::future_for_order_choice(factor.past, factor.outputs, largest));
+    let canonical = decompose(factor, varx, future, Weight::Cva)?;
+    let correlations = order::canonical_correlations(&canonical.singular_values, factor.columns);
+    let possible = canonical.largest_order().min(future * factor.outputs);
+    let evidence = order::singular_value_criterion(
+        &correlations,
+        factor.inputs,
+        factor.outputs,
+        factor.columns,
+        possible.min(largest),
+    );
+    Ok(order::proposal(&evidence).unwrap_or(1))
+}
+
+/// Errors of the free runs from rest, in scaled units: one series an output for each system.
+fn free_runs(
+    systems: &[(usize, StateSpace, bool)],
+    data: &Data,
+    records: &mut dyn Records,
+) -> Result<Vec<Vec<Vec<f64>>>, IdentifyError> {
+    let outputs = records.outputs().len();
+    let inputs = data.channels() - outputs;
+    let mut errors = vec![vec![Vec::new(); outputs]; systems.len()];
+    for experiment in 0..records.experiments() {
+        let trend = data.trend(experiment).clone();
+        let limit = LONGEST_RUN.min(records.kept_samples(experiment).max(1));
+        let mut states: Vec<DVector<f64>> = systems
+            .iter()
+            .map(|(_, s, _)| DVector::zeros(s.states()))
+            .collect();
+        let mut at = 0;
+        let mut aligner = Aligner::new(data.delays(), outputs);
+        records.read(experiment, Some(limit), &mut |columns| {
+            aligner.push(columns, &mut |columns| {
+                for k in 0..columns[0].len() {
+                    let value = |c: usize| (columns[c][k] - trend.at(c, at)) / data.scale[c];
+                    let u = DVector::from_fn(inputs, |j, _| value(j));
+                    for (((_, system, _), x), e) in systems.iter().zip(&mut states).zip(&mut errors)
+                    {
+                        let y = &system.c * &*x + &system.d * &u;
+                        for (o, e) in e.iter_mut().enumerate() {
+                            e.push(value(inputs + o) - y[o]);
+                        }
+                        *x = &system.a * &*x + &system.b * &u;
+                    }
+                    at += 1;
+                }
+            });
+        })?;
+    }
+    Ok(errors)
+}
+
+/// `N / sum rho^2`, the number of independent samples that a series is worth.
+fn effective(series: &[f64]) -> f64 {
+    let n = series.len();
+    let variance: f64 = series.iter().map(|v| v * v).sum();
+    let sum: f64 = (1..LAGS.min(n / 4))
+        .map(|lag| {
+            let r = series
+                .iter()
+                .zip(&series[lag..])
+                .map(|(a, b)| a * b)
+                .sum::<f64>()
+                / variance.max(1e-300);
+            // What chance adds to the sum is taken off.
+            r * r - 1.0 / n as f64
+        })
+        .sum();
+    n as f64 / (1.0 + 2.0 * sum.max(0.0))
+}

@@ -1,0 +1,142 @@
+//! `explain` on drives in closed loop that an independent fine-step simulator draws (`tests/drives/`).
+//!
+//! ```text
+//! cargo test --release --test drives -- --nocapture
+//! ```
+//!
+//! prints a line a drive. `INNOVANT_DRIVES` sets how many of each kind are drawn (1), `INNOVANT_DRIVES_SEED` draws others.
+
+#[allow(dead_code, reason = "shared with the concealed cases")]
+#[path = "concealed/dice.rs"]
+mod dice;
+#[path = "concealed/friction.rs"]
+mod friction;
+#[path = "drives/servo.rs"]
+mod servo;
+
+use dice::Dice;
+use innovant::Model;
+use innovant::explain::{Options, Simulation, Verdict, explain};
+use innovant::identify::IdentifiedChannel;
+use innovant::log::{Channel, Log};
+use innovant::model::StateSpace;
+use nalgebra::{DMatrix, DVector};
+use servo::{Drive, Missing, Recorded, STEP};
+
+fn log(name: &str, recorded: &Recorded) -> Log {
+    Log {
+        name: name.to_owned(),
+        sample_time: STEP,
+        start_time: 0.0,
+        inputs: vec![Channel::new("u1")],
+        outputs: vec![Channel::new("y1")],
+        input_data: vec![recorded.input.clone()],
+        output_data: vec![recorded.output.clone()],
+        sha256: None,
+    }
+}
+
+fn nominal(drive: &Drive, dice: &mut Dice) -> Model {
+    let (a, b) = drive.nominal(dice);
+    let n = b.len();
+    let mut c = DMatrix::zeros(1, n);
+    c[(0, 0)] = 1.0;
+    let system = StateSpace::deterministic(
+        DMatrix::from_row_slice(n, n, &a),
+        DMatrix::from_column_slice(n, 1, &b),
+        c,
+        DMatrix::zeros(1, 1),
+        STEP,
+    )
+    .unwrap();
+    let channel = |name: &str| IdentifiedChannel {
+        channel: Channel::new(name),
+        level: 0.0,
+        delay: 0,
+    };
+    Model {
+        system,
+        inputs: vec![channel("u1")],
+        outputs: vec![channel("y1")],
+        innovation_covariance: None,
+        initial_state: DVector::zeros(n),
+        covariance: None,
+        summary: None,
+        recordings: Vec::new(),
+    }
+}
+
+fn fit_percent(recorded: &[f64], simulated: &[f64]) -> f64 {
+    let n = recorded.len() as f64;
+    let mean = recorded.iter().sum::<f64>() / n;
+    let square = |it: &mut dyn Iterator<Item = f64>| it.map(|v| v * v).sum::<f64>();
+    let error = square(&mut recorded.iter().zip(simulated).map(|(a, b)| a - b));
+    let size = square(&mut recorded.iter().map(|a| a - mean));
+    100.0 * (1.0 - (error / size).sqrt())
+}
+
+fn from_environment(name: &str, otherwise: u64) -> u64 {
+    std::env::var(name)
+        .ok()
+        .and_then(|v| v.parse().ok())
+        .unwrap_or(otherwise)
+}
+
+#[test]
+fn what_drives_lack_is_named_with_their_mass() {
+    let (mut right, mut wrong, mut effects, mut alarms, mut masses) = (0, 0, 0, 0, 0);
+    let mut fits = Vec::new();
+    let each = from_environment("INNOVANT_DRIVES", 1);
+    let seed = from_environment("INNOVANT_DRIVES_SEED", 11);
+    let mut total = 0;
+    for (kind, missing) in Missing::ALL.into_iter().enumerate() {
+        for number in 0..each {
+            for speed in [false, true] {
+                // Laws of the position need one that is measured.
+                if speed && matches!(missing, Missing::Cubic | Missing::Cogging) {
+                    continue;
+                }
+                let mut dice = Dice::new(seed, 100 * kind as u64 + 2 * number + u64::from(speed));
+                let drive = Drive::draw(missing, speed, &mut dice);
+                let recording = log("drive", &drive.record(&mut dice));
+                let fresh = drive.record(&mut dice);
+                let model = nominal(&drive, &mut dice);
+                let simulation = Simulation::Model(Box::new(model), "nominal".to_owned());
+                let said = explain(&[recording], &simulation, &Options::default()).unwrap();
+                let names: Vec<&str> = said.effects.iter().map(|e| e.effect.as_str()).collect();
+                let ran = said.model.simulate(&[&fresh.input], None, None).unwrap();
+                let fit = fit_percent(&fresh.output, &ran[0]);
+                let mass = said
+                    .model
+                    .mechanics
+                    .as_ref()
+                    .map_or(f64::NAN, |m| m.mass.value / drive.mass);
+                println!(
+                    "{missing:?}{}: {:?} {names:?}, mass {mass:.4}, fresh free run {fit:.1} %",
+                    if speed { " (speed)" } else { "" },
+                    said.verdict
+                );
+                total += 1;
+                masses += usize::from((mass - 1.0).abs() < 0.03);
+                fits.push(fit);
+                let named = matches!(said.verdict, Verdict::Named | Verdict::Family);
+                if missing == Missing::Nothing {
+                    alarms += usize::from(named);
+                } else {
+                    effects += 1;
+                    right += usize::from(names.first() == Some(&missing.id()) && names.len() == 1);
+                    wrong += usize::from(named && !names.contains(&missing.id()));
+                }
+            }
+        }
+    }
+    fits.sort_by(f64::total_cmp);
+    println!(
+        "{right} of {effects} named alone, {wrong} wrong, {alarms} false alarms; mass within 3 % in {masses} of {total}; fresh \
+         free run {:.1} % (median)",
+        fits[fits.len() / 2]
+    );
+    assert_eq!(alarms, 0);
+    assert!(wrong * 10 <= effects, "{wrong} wrong of {effects}");
+    assert!(right * 3 >= effects * 2, "{right} of {effects}");
+}
