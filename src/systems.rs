@@ -3,6 +3,8 @@
 //! Tests, benches, examples and `data/` all draw from here, so that a number quoted for a system means
 //! the same system everywhere.
 
+mod knudsen;
+
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -10,6 +12,8 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::log::{Channel, Log};
 use crate::model::StateSpace;
+
+pub use knudsen::{KnudsenExample, armax_parameters, knudsen_armax, knudsen_bj, knudsen_vo};
 
 /// A plant with its noise and, perhaps, the feedback it runs under: `u[k] = F y[k] + reference[k]`.
 #[derive(Debug, Clone)]

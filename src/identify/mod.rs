@@ -25,6 +25,7 @@ mod error;
 mod finish;
 mod fit;
 mod horizon;
+pub mod knudsen;
 mod model;
 mod options;
 mod order;
