@@ -27,6 +27,8 @@ mod jacobian;
 mod observability;
 mod regression;
 mod stochastic;
+#[cfg(test)]
+mod tests;
 
 use super::error::IdentifyError;
 use crate::model::StateSpace;
