@@ -100,7 +100,7 @@ fn weighted_observability(
     };
     let weighted = match weight {
         ProjectionWeight::Moesp => product,
-        ProjectionWeight::Cva => crate::linalg::solve_upper_transposed(&root.transpose(), &product),
+        ProjectionWeight::Cva => solve_upper_transposed(&root.transpose(), &product),
     };
     let svd = svd_thin(&weighted)?;
     let mut left = svd.u.columns(0, order).into_owned();

@@ -7,9 +7,15 @@
 //! | file | method | source |
 //! |---|---|---|
 //! | `pbsid_opt` | [`Method::PbsidOpt`] | van Wingerden |
+//! | `knudsen` | [`Method::Knudsen`] | Knudsen |
+//! | `pem` | [`Method::Pem`] | Ljung |
+//! | `subid` | [`Method::Subid`] | van Overschee & De Moor |
 //! | `closed_loop` | [`Method::Whitening`], [`Method::InnovationEstimation`] | Chiuso & Picci |
 
+mod knudsen;
 mod pbsid_opt;
+mod pem;
+mod subid;
 
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -18,8 +24,10 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::error::IdentifyError;
+use super::horizon;
 use super::pbsid_opt::Weight;
 use super::source::Source;
+use super::stochastic::Stochastic;
 use super::varx::Varx;
 use crate::covariance::ParameterCovariance;
 use crate::model::StateSpace;
@@ -44,6 +52,12 @@ pub enum Method {
     /// maximum-likelihood polish
     #[default]
     PbsidOpt,
+    /// Knudsen's tk-chol (with --stochastic first-column tk); open loop only
+    Knudsen,
+    /// Prediction error method: maximum likelihood in the time domain, started from tk-chol or PBSID_opt
+    Pem,
+    /// Robust combined subspace algorithm of van Overschee and De Moor; open loop only
+    Subid,
 }
 
 impl Method {
@@ -56,6 +70,9 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::PbsidOpt => "pbsid-opt",
+            Self::Knudsen => "knudsen",
+            Self::Pem => "pem",
+            Self::Subid => "subid",
         }
     }
 
@@ -67,20 +84,67 @@ impl Method {
                 let _ = future;
                 past
             }
+            // An order that fits the past window of l outputs has a future of at most past + 2.
+            Self::Knudsen | Self::Pem | Self::Subid => past + future.unwrap_or(past + 2),
         }
     }
 
     /// Whether the future window may be longer than the past window.
     pub fn allows_longer_future(self) -> bool {
         match self {
-            Self::PbsidOpt => false,
+            Self::PbsidOpt | Self::Pem | Self::Subid => false,
+            Self::Knudsen => true,
         }
+    }
+
+    /// Future window for an order when none is asked for.
+    pub fn future(self, past: usize, outputs: usize, order: usize) -> usize {
+        match self {
+            Self::PbsidOpt | Self::Pem => horizon::future_for_order(past, outputs, order),
+            // Longer ones add noise to the Toeplitz matrices faster than they add information.
+            Self::Knudsen => order.div_ceil(outputs) + 2,
+            // The algorithm needs both windows equal.
+            Self::Subid => past,
+        }
+    }
+
+    /// Smallest past window that is chosen automatically, for the largest order that is asked for.
+    pub fn smallest_past(self, outputs: usize, order: usize) -> usize {
+        match self {
+            Self::PbsidOpt | Self::Pem => 1,
+            Self::Knudsen => knudsen::SMALLEST_PAST,
+            // n states are seen over n / l samples, and the future window is shifted by one.
+            Self::Subid => order.div_ceil(outputs) + 2,
+        }
+    }
+
+    /// The method that stands in while orders are compared: the prediction error method runs once, in the end.
+    pub fn for_comparing_orders(self) -> Self {
+        match self {
+            Self::Pem => Self::PbsidOpt,
+            other => other,
+        }
+    }
+
+    /// Whether the method does `--polish always` itself: its numbers are then those of its own improvement.
+    pub fn polishes_itself(self) -> bool {
+        match self {
+            // One Gauss-Newton step in the time domain; the other is maximum likelihood as it is.
+            Self::Knudsen | Self::Pem => true,
+            Self::PbsidOpt | Self::Subid => false,
+        }
+    }
+
+    /// Whether the method does this stochastic step itself, with its covariance.
+    pub fn has_own(self, step: Stochastic) -> bool {
+        self == Self::Knudsen && matches!(step, Stochastic::FirstColumn | Stochastic::Cholesky)
     }
 
     /// Whether [`Estimated::covariance`] has a formula.
     pub fn has_covariance(self) -> bool {
         match self {
-            Self::PbsidOpt => true,
+            Self::PbsidOpt | Self::Knudsen | Self::Pem => true,
+            Self::Subid => false,
         }
     }
 
@@ -95,6 +159,8 @@ impl Method {
     pub fn default_weight(self, automatic: Weight) -> Weight {
         match self {
             Self::PbsidOpt => automatic,
+            // Their one weight is part of them; subid's own is called SV.
+            Self::Knudsen | Self::Pem | Self::Subid => Weight::Identity,
         }
     }
 
@@ -112,6 +178,9 @@ impl Method {
                 let _ = source;
                 pbsid_opt::decomposed(windows)
             }
+            Self::Knudsen => knudsen::decomposed(windows, source),
+            Self::Pem => pem::decomposed(windows, source),
+            Self::Subid => subid::decomposed(windows, source),
         }
     }
 }
@@ -127,6 +196,12 @@ pub struct Windows {
     pub future: usize,
     /// Weight of the singular value decomposition.
     pub weight: Weight,
+    /// The stochastic step that was asked for, for a method that does it itself ([`Method::has_own`]).
+    pub stochastic: Option<Stochastic>,
+    /// Whether orders are still being compared: what only the final model needs can wait.
+    pub comparing: bool,
+    /// Whether a method that polishes its estimate itself ([`Method::polishes_itself`]) is to do so.
+    pub polish_by_method: bool,
     /// Sample time in seconds.
     pub sample_time: f64,
 }
@@ -184,6 +259,11 @@ pub trait Estimated: Debug + Send + Sync {
     /// # Errors
     /// [`IdentifyError`] when those data do not allow it.
     fn replicate(&self, factor: &RFactor) -> Result<StateSpace, IdentifyError>;
+
+    /// Whether the estimate is what the method aims at; a search may run out of steps.
+    fn converged(&self) -> bool {
+        true
+    }
 }
 
 /// First-order errors as a linear function of white noise `w` of unit covariance.
