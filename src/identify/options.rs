@@ -99,8 +99,12 @@ impl Options {
 
     /// Whether the covariance is, or may have to be, that of the jackknife.
     pub(super) fn may_need_blocks(&self) -> bool {
-        let formula =
-            self.method.has_covariance() && self.stochastic.is_none_or(Stochastic::has_covariance);
+        let formula = match self.stochastic {
+            Some(step) if !self.method.has_own(step) => {
+                self.method.has_propagation() && step.has_covariance()
+            }
+            _ => self.method.has_covariance(),
+        };
         self.covariance == CovarianceKind::Robust || !(formula || self.polish == Polish::Always)
     }
 

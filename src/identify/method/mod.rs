@@ -160,6 +160,14 @@ impl Method {
         }
     }
 
+    /// Whether [`Estimated::propagation`] has a formula, which a stochastic step of another method builds on.
+    pub fn has_propagation(self) -> bool {
+        match self {
+            Self::PbsidOpt | Self::Whitening | Self::InnovationEstimation => true,
+            Self::Knudsen | Self::Pem | Self::Subid => false,
+        }
+    }
+
     /// Whether `--polish auto` polishes. Who asks for another method by name wants that method's numbers: the
     /// polished model is the same whatever method it started from.
     pub fn polishes_by_default(self) -> bool {
