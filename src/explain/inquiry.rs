@@ -288,10 +288,9 @@ fn owed(ranked: &Ranked, index: usize, base: f64, count: usize) -> f64 {
         "extra_mode" => MODE_HANDICAP * gain,
         // Nested in a simpler law: it must do better than make up for the imperfection of that law.
         "stribeck_friction" => LAW_IMPERFECTION * gain,
-        // Hardly to be told from what is far more common: a delay, which every sampled loop has; dry friction, whose
-        // bristles make a loop of their own.
+        // Hardly to be told from a delay, which every sampled loop has.
         "actuator_lag" => TIE,
-        "hysteresis" => TIE.max(DRY_HANDICAP * gain),
+        "hysteresis" => DRY_HANDICAP * gain,
         _ => 0.0,
     };
     owed

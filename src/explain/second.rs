@@ -65,8 +65,16 @@ pub(crate) fn pair(
         }
     }
     let single_gain = base - best.criterion;
-    let mut found = second_effects(problem, &firsts, allowed);
-    found.extend(derived(problem, REFINEMENTS, &found, base, allowed));
+    let found = second_effects(problem, &firsts, allowed);
+    // Beside each first, since the best of one would keep the others from being refined.
+    let first = |r: &Ranked| r.fit.structure.new_effects()[0].definition.id;
+    let (of_best, of_second): (Vec<Ranked>, Vec<Ranked>) =
+        found.into_iter().partition(|r| first(r) == id(best));
+    let mut found = Vec::new();
+    for group in [of_best, of_second] {
+        found.extend(derived(problem, REFINEMENTS, &group, base, allowed));
+        found.extend(group);
+    }
     for r in &mut found {
         r.criterion += penalty(r, base, count);
     }
@@ -78,7 +86,6 @@ pub(crate) fn pair(
     // The best pairs are close to one another, and not fitted to the end: the best of each first effect is.
     let mut finalists: Vec<Ranked> = Vec::new();
     for r in found {
-        let first = |r: &Ranked| r.fit.structure.new_effects()[0].definition.id;
         if finalists.iter().all(|f| first(f) != first(&r)) {
             finalists.push(r);
         }

@@ -1,5 +1,7 @@
 //! From recordings to system matrices with their covariance: windows, order, estimate, polish.
 
+use std::sync::Arc;
+
 use nalgebra::DMatrix;
 
 use super::data::Data;
@@ -10,6 +12,7 @@ use super::horizon;
 use super::options::{Options, Order};
 use super::records::Records;
 use super::select::{Windowed, propose, select};
+use super::source::Source;
 use super::summary::{PastEvidence, Summary};
 use super::truncation::past_for_truncation;
 use super::varx::varx;
@@ -55,17 +58,23 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
     let longest = horizon::LONGEST_PAST_ON_DEMAND
         .min((LARGEST_AUTOMATIC_FACTOR / q).saturating_sub(1))
         .max(1);
-    let data = Data::read(records, options, options.past.unwrap_or(longest))?;
-    let sample_time = records.sample_time();
+    let longest = options.past.unwrap_or(longest);
+    let lags = options.method.lags(longest, options.future);
+    let lags = options
+        .stochastic
+        .map_or(lags, |step| lags.max(step.lags(longest, options.future)));
+    let data = Data::read(records, options, lags)?;
+    let longest = longest.min(data.lags());
 
     let mut explanation = Vec::new();
     let (past, past_windows) = match options.past {
         Some(past) => (past, Vec::new()),
-        None => choose_past(&data, records, options, &mut explanation)?,
+        None => choose_past(&data, records, options, longest, &mut explanation)?,
     };
-    let mut chosen = windowed(&data, records, past, options)?;
+    let mut source = Source::new(&data, records);
+    let mut chosen = windowed(&mut source, past, options)?;
     // A plant that is not linear, recorded with little noise, has no linear order: its free run decides.
-    let low = low_order(&chosen, &data, records, options, sample_time)?;
+    let low = low_order(&chosen, &mut source, options)?;
     let narrowed = Options {
         order: low
             .as_ref()
@@ -79,15 +88,15 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
     let options = &narrowed;
     // While the past window is too short the tests of the order have no meaning: they wait until it is chosen.
     let mut selection = if options.past.is_none() {
-        propose(&chosen, options, sample_time)?
+        propose(&chosen, options, &mut source)?
     } else {
-        select(&chosen, options, sample_time)?
+        select(&chosen, options, &mut source)?
     };
 
     if options.past.is_none() {
         // The past window must be long enough for the predictor of the model that it leads to.
         let samples = data.samples;
-        let limit = horizon::longest_past(samples, q, data.lags()).max(chosen.factor.past);
+        let limit = horizon::longest_past(samples, q, longest).max(chosen.factor.past);
         for _ in 0..4 {
             let past = chosen.factor.past;
             if selection.noise_free
@@ -108,14 +117,14 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
             .unwrap_or(limit)
             // An estimate of the decay from a short window is not to be trusted far beyond it.
             .min(2 * past + 2);
-            chosen = windowed(&data, records, wanted, options)?;
-            selection = propose(&chosen, options, sample_time)?;
+            chosen = windowed(&mut source, wanted, options)?;
+            selection = propose(&chosen, options, &mut source)?;
             explanation.retain(|line| !line.starts_with("past window lengthened"));
             explanation.push(format!(
                 "past window lengthened to {wanted} so that what it cuts off no longer matters"
             ));
         }
-        selection = select(&chosen, options, sample_time)?;
+        selection = select(&chosen, options, &mut source)?;
     }
     if let Some(low) = low {
         selection.explanation = low.explanation;
@@ -123,6 +132,7 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
     finish(
         &final_options,
         &data,
+        &source,
         Chosen {
             windowed: chosen,
             selection,
@@ -149,6 +159,7 @@ fn check_windows(options: &Options, q: usize, outputs: usize) -> Result<(), Iden
     }
     if let (Some(past), Some(future)) = (past, future)
         && future > past
+        && !options.method.allows_longer_future()
     {
         return wrong("the future window cannot be longer than the past window".to_owned());
     }
@@ -195,21 +206,12 @@ fn check_windows(options: &Options, q: usize, outputs: usize) -> Result<(), Iden
 }
 
 fn windowed(
-    data: &Data,
-    records: &mut dyn Records,
+    source: &mut Source<'_>,
     past: usize,
     options: &Options,
 ) -> Result<Windowed, IdentifyError> {
-    let q = data.channels();
-    if data.samples <= past {
-        return Err(IdentifyError::TooShort {
-            samples: data.samples,
-            past,
-            needed: past * (q + 1) + records.outputs().len() + 1,
-        });
-    }
-    let factor = data.factor(records, past)?;
-    let varx = varx(&factor, options.feedthrough)?;
+    let factor = source.factor(past)?;
+    let varx = Arc::new(varx(&factor, options.feedthrough)?);
     Ok(Windowed { factor, varx })
 }
 
@@ -217,22 +219,31 @@ fn choose_past(
     data: &Data,
     records: &mut dyn Records,
     options: &Options,
+    longest: usize,
     explanation: &mut Vec<String>,
 ) -> Result<(usize, Vec<PastEvidence>), IdentifyError> {
     let q = data.channels();
     let outputs = records.outputs().len();
-    let limit = horizon::longest_past(data.samples, q, horizon::LONGEST_PAST.min(data.lags()));
+    let limit = horizon::longest_past(data.samples, q, horizon::LONGEST_PAST.min(longest));
     // An order or a future window that was asked for must fit in.
-    let smallest = options
-        .order
-        .largest()
-        .div_ceil(outputs)
-        .max(options.future.unwrap_or(1));
-    let limit = limit.max(smallest).min(data.lags());
+    let smallest =
+        options
+            .order
+            .largest()
+            .div_ceil(outputs)
+            .max(if options.method.allows_longer_future() {
+                1
+            } else {
+                options.future.unwrap_or(1)
+            });
+    let limit = limit.max(smallest).min(longest);
+    let preferred = options
+        .method
+        .smallest_past(outputs, options.order.largest());
     if smallest > limit || smallest * (q + 1) + outputs >= data.samples {
         let order = options.order.largest();
         // The past window that the recording allows, with more windows than regressors.
-        let largest = (data.samples.saturating_sub(outputs + 1) / (q + 1)).min(data.lags());
+        let largest = (data.samples.saturating_sub(outputs + 1) / (q + 1)).min(longest);
         return Err(if order.div_ceil(outputs) >= smallest {
             IdentifyError::Order {
                 order,
@@ -260,9 +271,14 @@ fn choose_past(
     // Akaike's choice balances bias against variance of the predictions; the states need the tail of the
     // predictor a little more, and the polish takes the extra variance out again.
     let past = if noise_free { best } else { best + 2 };
-    let past = past.max(smallest).min(limit);
+    let past = past.max(smallest).max(preferred).min(limit);
     explanation.push(format!(
-        "past window {past}: Akaike's criterion of the vector ARX model is smallest at {best} (of 1..{limit})"
+        "past window {past}: Akaike's criterion of the vector ARX model is smallest at {best} (of 1..{limit}){}",
+        if past == preferred && best + 2 < preferred {
+            format!("; {} wants at least {preferred}", options.method.name())
+        } else {
+            String::new()
+        }
     ));
     let evidence = criterion
         .into_iter()

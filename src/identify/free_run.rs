@@ -9,17 +9,16 @@
 
 use nalgebra::DVector;
 
-use super::candidate::Window;
 use super::data::Data;
 use super::delay::Aligner;
 use super::error::IdentifyError;
 use super::horizon;
 use super::options::{Options, Order};
 use super::order;
-use super::pbsid_opt::{Weight, decompose};
-use super::polish::Effort;
+use super::pbsid_opt::{Weight, decompose, system_matrices};
 use super::records::Records;
 use super::select::{Windowed, automatic_weight};
+use super::source::Source;
 use super::stable::{largest_stable_radius, with_poles_inside};
 use crate::linalg::spectral_radius;
 use crate::model::StateSpace;
@@ -55,11 +54,11 @@ pub struct LowOrder {
 /// When reading the recordings again fails, or the decomposition.
 pub fn low_order(
     windowed: &Windowed,
-    data: &Data,
-    records: &mut dyn Records,
+    source: &mut Source,
     options: &Options,
-    sample_time: f64,
 ) -> Result<Option<LowOrder>, IdentifyError> {
+    let sample_time = source.sample_time();
+    let (data, records) = source.parts();
     let Windowed { factor, varx } = windowed;
     if !matches!(options.order, Order::Auto) {
         return Ok(None);
@@ -71,13 +70,6 @@ pub fn low_order(
     let weight = options
         .weight
         .unwrap_or_else(|| automatic_weight(factor, varx));
-    let window = Window {
-        factor,
-        varx,
-        sample_time,
-        polish: false,
-        effort: Effort::Referee,
-    };
     let radius = largest_stable_radius(varx.columns);
     let mut systems: Vec<(usize, StateSpace, bool)> = Vec::new();
     let future = horizon::future_for_order(factor.past, factor.outputs, ORDERS[0]);
@@ -86,10 +78,11 @@ pub fn low_order(
         if order > decomposition.largest_order() {
             break;
         }
-        let Ok(candidate) = window.candidate(&decomposition, order) else {
+        let map = decomposition.state_map(order);
+        let Ok(estimate) = system_matrices(factor, varx, &decomposition, map, sample_time) else {
             continue;
         };
-        let system = candidate.estimate.system;
+        let system = estimate.system;
         let unstable = spectral_radius(&system.a)? > radius;
         let system = if unstable {
             match with_poles_inside(&system, radius) {

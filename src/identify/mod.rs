@@ -7,7 +7,13 @@
 //! | `records`, `delay`, `data` | recordings, streamed once, aligned, as moments | |
 //! | `horizon` | past window by Akaike's criterion, future window | |
 //! | `varx` | the high-order vector ARX model | van Wingerden (22)-(23) |
+//! | `method` | which algorithm: one enum variant and one module each | |
 //! | `pbsid_opt` | states by a weighted singular value decomposition, system matrices by least squares | van Wingerden (24)-(34) |
+//! | `stochastic` | `K` and `Lambda` by a step of its own, for any deterministic part | |
+//! | `nested` | states from nested regressions, growing past | Chiuso & Picci; Qin & Ljung |
+//! | `knudsen` | regression of future outputs on past and future inputs; tk, tk-chol | Knudsen |
+//! | `pem` | the prediction error method in the time domain | Ljung |
+//! | `baselines` | subid, an n4sid, the methods of Knudsen's table 2 | van Overschee & De Moor; Ljung |
 //! | `order`, `select` | which order: singular values propose, a chi-square test referees | Bauer 2001 |
 //! | `free_run` | the order of a plant that is not linear: by its free run | |
 //! | `truncation` | what the past window cuts off | |
@@ -19,6 +25,7 @@
 //! Conventions: `x[k+1] = A x[k] + B u[k] + K e[k]`, `y[k] = C x[k] + D u[k] + e[k]`; `r` inputs, `l` outputs,
 //! `n` states, `z = [u; y]`, `q = r + l`; past window `p`, future window `f <= p`, `Nc = N - p` windows.
 
+pub mod baselines;
 mod candidate;
 mod data;
 mod delay;
@@ -27,16 +34,22 @@ mod finish;
 mod fit;
 mod free_run;
 mod horizon;
+pub mod knudsen;
+pub mod method;
 mod model;
+mod nested;
 mod options;
 mod order;
 mod pbsid_opt;
+pub mod pem;
 mod polish;
 mod records;
 mod scaling;
 mod select;
 mod simulate;
+mod source;
 mod stable;
+pub mod stochastic;
 mod summary;
 mod truncation;
 mod varx;
@@ -45,11 +58,17 @@ mod warnings;
 pub use delay::Aligner;
 pub use error::IdentifyError;
 pub use fit::{Fit, fit};
+pub use method::{Method, Propagation};
 pub use model::{IdentifiedChannel, Model, identify, identify_records};
+pub use nested::{
+    Nested, NestedDecomposition, Prediction, decompose_nested, nested_system_matrices,
+};
 pub use options::{CovarianceKind, Options, Order, Polish};
 pub use order::OrderEvidence;
 pub use pbsid_opt::{Decomposition, Estimate, Weight, decompose, system_matrices};
 pub use polish::{Effort, Polished, coefficient_cost, polish, predictor_coefficients};
 pub use records::{FileRecords, MemoryRecords, ReadProgress, Recording, Records};
+pub use source::Source;
+pub use stochastic::Stochastic;
 pub use summary::{Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary};
 pub use varx::{Varx, varx};
