@@ -35,6 +35,8 @@ def identify(
     y: NDArray[np.float64],
     *,
     dt: float,
+    method: str = "pbsid-opt",
+    stochastic: str | None = None,
     order: int | None = None,
     past: int | None = None,
     future: int | None = None,
