@@ -11,6 +11,10 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::log::{Channel, Log};
 use crate::model::StateSpace;
 
+mod acoustic_duct;
+
+pub use acoustic_duct::acoustic_duct;
+
 /// A plant with its noise and, perhaps, the feedback it runs under: `u[k] = F y[k] + reference[k]`.
 #[derive(Debug, Clone)]
 pub struct TestSystem {

@@ -15,6 +15,7 @@
 //! | `eigen` | ordinary, symmetric and generalised eigenvalue problems |
 //! | `logarithm` | logarithm and exponential of small matrices |
 //! | `lyapunov` | discrete Lyapunov equation, stabilising observer gain |
+//! | `riccati` | stationary Kalman filter |
 
 mod cholesky;
 mod eigen;
@@ -24,6 +25,7 @@ mod logarithm;
 mod lyapunov;
 mod product;
 mod qr;
+mod riccati;
 mod singular;
 mod triangular;
 
@@ -37,6 +39,7 @@ pub use logarithm::{exponential, logarithm};
 pub use lyapunov::{discrete_lyapunov, stabilising_observer_gain};
 pub use product::{multiply, multiply_nt, multiply_tn};
 pub use qr::{least_squares, qr_r, qr_thin};
+pub use riccati::{StationaryFilter, stationary_filter};
 pub use singular::{Svd, pseudo_inverse, svd_thin};
 pub use triangular::{
     reciprocal_condition_upper, solve_upper, solve_upper_right, solve_upper_transposed,

@@ -8,8 +8,10 @@
 //! | `json`           | how JSON is laid out; `location`: where in it something stands    |
 //! | `schema`         | the JSON Schema                                                   |
 //! | `text`           | tables for a terminal                                             |
+//! | `page`           | the page of an explanation; `drawing`: what pages are drawn with  |
 
 mod channels;
+mod drawing;
 mod error;
 mod json;
 mod location;
@@ -31,7 +33,8 @@ pub use model_document::{
     DiagnosticsDocument, InvariantsDocument, MODEL_FORMAT, ModelDocument, Provenance,
 };
 pub use packed::CovarianceDocument;
-pub use page::{PageError, explanation_page};
+pub use drawing::PageError;
+pub use page::explanation_page;
 pub use read::{ReadModel, parse_model, read_model};
 pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
 pub use schema::{explanation_schema, model_schema};
