@@ -116,7 +116,13 @@ mod tests {
         let a = DMatrix::from_row_slice(2, 2, &[1.2, 0.0, 0.0, 0.5]);
         let c = DMatrix::from_row_slice(1, 2, &[0.0, 1.0]);
         let one = DMatrix::identity(1, 1);
-        let found = stationary_filter(&a, &c, &DMatrix::identity(2, 2), &one, &DMatrix::zeros(2, 1));
+        let found = stationary_filter(
+            &a,
+            &c,
+            &DMatrix::identity(2, 2),
+            &one,
+            &DMatrix::zeros(2, 1),
+        );
         assert!(found.is_err());
     }
 }

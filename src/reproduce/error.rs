@@ -10,7 +10,9 @@ use crate::model::ModelError;
 #[non_exhaustive]
 pub enum ReproduceError {
     /// Statistics over runs need runs.
-    #[error("{runs} runs are too few for statistics over runs; ask for at least {least} with --runs")]
+    #[error(
+        "{runs} runs are too few for statistics over runs; ask for at least {least} with --runs"
+    )]
     TooFewRuns {
         /// How many were asked for.
         runs: usize,

@@ -18,7 +18,10 @@ pub(super) fn variance(values: &[f64]) -> f64 {
 
 /// Mean, and its standard error over independent runs.
 pub(super) fn mean_with_error(values: &[f64]) -> (f64, f64) {
-    (mean(values), (variance(values) / values.len() as f64).sqrt())
+    (
+        mean(values),
+        (variance(values) / values.len() as f64).sqrt(),
+    )
 }
 
 /// Root mean square.

@@ -47,9 +47,7 @@ impl Study<'_> {
         runs: usize,
         run: impl Fn(u64) -> T + Sync,
     ) -> Vec<T> {
-        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        let seeds: Vec<u64> = (0..runs).map(|_| random.next_u64()).collect();
-        seeds
+        self.monte_carlo_seeds(runs)
             .into_par_iter()
             .map(|seed| {
                 let result = run(seed);
@@ -57,6 +55,12 @@ impl Study<'_> {
                 result
             })
             .collect()
+    }
+
+    /// The seeds of the first `runs` runs.
+    pub(super) fn monte_carlo_seeds(&self, runs: usize) -> Vec<u64> {
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        (0..runs).map(|_| random.next_u64()).collect()
     }
 }
 
@@ -144,18 +148,30 @@ mod tests {
     fn few_failures_are_counted_and_many_are_an_error() {
         let results = |failures: usize| -> Vec<Result<usize, String>> {
             (0..100)
-                .map(|k| if k < failures { Err(format!("run {k}")) } else { Ok(k) })
+                .map(|k| {
+                    if k < failures {
+                        Err(format!("run {k}"))
+                    } else {
+                        Ok(k)
+                    }
+                })
                 .collect()
         };
         let (kept, failed) = successes("method", results(3)).unwrap();
         assert_eq!((kept.len(), failed), (97, 3));
         let error = successes("method", results(6)).unwrap_err().to_string();
-        assert!(error.contains("method failed in 6 of 100") && error.contains("run 0"), "{error}");
+        assert!(
+            error.contains("method failed in 6 of 100") && error.contains("run 0"),
+            "{error}"
+        );
     }
 
     #[test]
     fn too_few_runs_are_refused() {
-        let study = Study { runs: Some(3), ..study(1) };
+        let study = Study {
+            runs: Some(3),
+            ..study(1)
+        };
         assert!(study.count(200).is_err());
         assert_eq!(super::tests::study(1).count(200).unwrap(), 200);
     }

@@ -119,8 +119,7 @@ pub fn acoustic_duct() -> Result<TestSystem, LinalgError> {
     // The output is what input and noise give together; the ratio is that of the output to the noise.
     let noise_variance = 10f64.powf(-SIGNAL_TO_NOISE_DB / 10.0);
     noise *= (SHARE_OF_PROCESS_NOISE * noise_variance / variance(&noise)?).sqrt();
-    let measurement =
-        DMatrix::from_element(1, 1, (1.0 - SHARE_OF_PROCESS_NOISE) * noise_variance);
+    let measurement = DMatrix::from_element(1, 1, (1.0 - SHARE_OF_PROCESS_NOISE) * noise_variance);
     let filter = stationary_filter(
         &a,
         &c,

@@ -88,6 +88,28 @@ impl Axis {
         }
     }
 
+    /// The same, logarithmic where the values are positive.
+    pub(in crate::report) fn logarithmic(self) -> Self {
+        if self.from > 0.0 && !self.logarithmic {
+            Self {
+                from: self.from.log10(),
+                to: self.to.log10(),
+                logarithmic: true,
+            }
+        } else {
+            self
+        }
+    }
+
+    /// The value at the lower end.
+    pub(in crate::report) fn lowest(&self) -> f64 {
+        if self.logarithmic {
+            10f64.powf(self.from)
+        } else {
+            self.from
+        }
+    }
+
     /// Where a value lies, 0 at the lower and 1 at the upper end; not finite where it has no place.
     pub(in crate::report) fn share(&self, value: f64) -> f64 {
         let value = if self.logarithmic {
@@ -148,9 +170,20 @@ impl Axis {
         let first = self.from.floor().clamp(-99.0, 99.0) as i32;
         let last = self.to.ceil().clamp(-99.0, 99.0) as i32;
         (first..=last)
-            .flat_map(|decade| between.iter().map(move |m| m * 10f64.powi(decade)))
-            .filter(|v| (self.from..=self.to).contains(&v.log10()))
-            .map(|v| (v, number(v, 1)))
+            .flat_map(|decade| between.iter().map(move |m| (*m, decade)))
+            .map(|(m, decade)| (m * 10f64.powi(decade), m, decade))
+            .filter(|(v, ..)| (self.from..=self.to).contains(&v.log10()))
+            .map(|(v, m, decade)| {
+                let bare = m == 1.0 && !(-3..5).contains(&decade);
+                (
+                    v,
+                    if bare {
+                        power_of_ten(decade)
+                    } else {
+                        number(v, 1)
+                    },
+                )
+            })
             .collect()
     }
 

@@ -53,6 +53,8 @@ pub(in crate::report) struct Series {
     pub(in crate::report) path: String,
     /// Area around the line.
     pub(in crate::report) area: Option<String>,
+    /// A bundle of lines, of which no single value is read.
+    pub(in crate::report) quiet: bool,
 }
 
 /// An interval along the horizontal axis.
@@ -89,7 +91,38 @@ impl Series {
             class,
             path: line(axes.0, axes.1, points),
             area: None,
+            quiet: false,
         }
+    }
+
+    /// A bundle of lines of one kind, each of them drawn from its own beginning.
+    pub(in crate::report) fn bundle(
+        name: impl Into<String>,
+        class: &'static str,
+        axes: (&Axis, &Axis),
+        lines: impl IntoIterator<Item = Vec<(f64, f64)>>,
+    ) -> Self {
+        let paths: Vec<String> = lines
+            .into_iter()
+            .map(|points| line(axes.0, axes.1, points))
+            .collect();
+        Self {
+            name: name.into(),
+            class,
+            quiet: paths.len() > 1,
+            path: paths.concat(),
+            area: None,
+        }
+    }
+
+    /// The same with an area: `(at, lower, upper)`.
+    pub(in crate::report) fn within(
+        mut self,
+        axes: (&Axis, &Axis),
+        limits: &[(f64, f64, f64)],
+    ) -> Self {
+        self.area = Some(area(axes.0, axes.1, limits));
+        self
     }
 
     /// Dots within an area: `(at, value, deviation)`.
@@ -105,13 +138,20 @@ impl Series {
             class,
             path: dots(axes.0, axes.1, points.iter().map(|p| (p.0, p.1))),
             area: Some(area(axes.0, axes.1, &around)),
+            quiet: false,
         }
     }
 }
 
 impl Shade {
     /// An interval cut to the axis; `None` outside of it.
-    pub(in crate::report) fn new(x: &Axis, from: f64, to: f64, label: String, title: String) -> Option<Self> {
+    pub(in crate::report) fn new(
+        x: &Axis,
+        from: f64,
+        to: f64,
+        label: String,
+        title: String,
+    ) -> Option<Self> {
         let (a, b) = x.cut(from, to)?;
         Some(Self {
             from: fixed_plain(SIZE * a),

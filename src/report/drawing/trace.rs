@@ -15,7 +15,11 @@ fn point(x: &Axis, y: &Axis, at: f64, value: f64) -> Option<(i64, i64)> {
 }
 
 /// A line through the points; it is broken where a value is not finite.
-pub(in crate::report) fn line(x: &Axis, y: &Axis, points: impl IntoIterator<Item = (f64, f64)>) -> String {
+pub(in crate::report) fn line(
+    x: &Axis,
+    y: &Axis,
+    points: impl IntoIterator<Item = (f64, f64)>,
+) -> String {
     let mut path = String::new();
     let mut last: Option<(i64, i64)> = None;
     let mut fresh = true;
@@ -47,7 +51,11 @@ pub(in crate::report) fn line(x: &Axis, y: &Axis, points: impl IntoIterator<Item
 }
 
 /// Dots at the points: lines without length, which round caps make round at any scale.
-pub(in crate::report) fn dots(x: &Axis, y: &Axis, points: impl IntoIterator<Item = (f64, f64)>) -> String {
+pub(in crate::report) fn dots(
+    x: &Axis,
+    y: &Axis,
+    points: impl IntoIterator<Item = (f64, f64)>,
+) -> String {
     points
         .into_iter()
         .filter_map(|(at, value)| point(x, y, at, value))
