@@ -14,6 +14,11 @@ use crate::model::StateSpace;
 mod acoustic_duct;
 
 pub use acoustic_duct::acoustic_duct;
+mod chiuso_picci;
+mod closed_loop;
+
+pub use chiuso_picci::{chiuso_picci_frequencies, chiuso_picci_one, chiuso_picci_two};
+pub use closed_loop::{ClosedLoop, JointModel};
 
 /// A plant with its noise and, perhaps, the feedback it runs under: `u[k] = F y[k] + reference[k]`.
 #[derive(Debug, Clone)]
@@ -62,14 +67,6 @@ impl TestSystem {
                 column.push(*value);
             }
         }
-        let channels = |letter: char, count: usize| {
-            (1..=count)
-                .map(|i| Channel {
-                    name: format!("{letter}{i}"),
-                    unit: None,
-                })
-                .collect::<Vec<_>>()
-        };
         Log {
             name: format!("seed {seed}"),
             sample_time: system.sample_time,
@@ -81,6 +78,16 @@ impl TestSystem {
             sha256: None,
         }
     }
+}
+
+/// `u1`, `u2`, ... without units.
+fn channels(letter: char, count: usize) -> Vec<Channel> {
+    (1..=count)
+        .map(|i| Channel {
+            name: format!("{letter}{i}"),
+            unit: None,
+        })
+        .collect()
 }
 
 /// van Wingerden, Example I, with `C(1,1) = -0.3749`: the printed `+0.3749` lost its sign (with it the loop

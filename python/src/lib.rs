@@ -1,6 +1,6 @@
 //! Python wheel over the same core: `innovant.identify(u, y, dt=...)`.
 
-use innovant::identify::{CovarianceKind, Order, Polish, Weight};
+use innovant::identify::{CovarianceKind, Method, Order, Polish, Stochastic, Weight};
 use innovant::log::{Channel, Log};
 use innovant::moments::Detrend;
 use innovant::report::ModelDocument;
@@ -124,7 +124,7 @@ fn choice<T: Copy>(name: &str, value: &str, choices: &[(&str, T)]) -> PyResult<T
 
 /// Identifies a state-space model from arrays of samples x channels.
 #[pyfunction]
-#[pyo3(signature = (u, y, *, dt, order=None, past=None, future=None, weight=None, polish="auto",
+#[pyo3(signature = (u, y, *, dt, method="pbsid-opt", stochastic=None, order=None, past=None, future=None, weight=None, polish="auto",
     covariance="model", detrend="mean", feedthrough=false, delay=Vec::new(), stable=false, seed=0))]
 #[allow(clippy::too_many_arguments)]
 fn identify(
@@ -132,6 +132,8 @@ fn identify(
     u: PyReadonlyArray2<'_, f64>,
     y: PyReadonlyArray2<'_, f64>,
     dt: f64,
+    method: &str,
+    stochastic: Option<&str>,
     order: Option<usize>,
     past: Option<usize>,
     future: Option<usize>,
@@ -144,7 +146,13 @@ fn identify(
     stable: bool,
     seed: u64,
 ) -> PyResult<PyModel> {
+    let methods: Vec<(&str, Method)> = Method::all().iter().map(|m| (m.name(), *m)).collect();
+    let steps: Vec<(&str, Stochastic)> = Stochastic::all().iter().map(|s| (s.name(), *s)).collect();
     let options = Options {
+        method: choice("method", method, &methods)?,
+        stochastic: stochastic
+            .map(|word| choice("stochastic", word, &steps))
+            .transpose()?,
         order: order.map_or(Order::Auto, Order::Fixed),
         past,
         future,

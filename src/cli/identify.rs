@@ -13,8 +13,8 @@ use super::roles::RoleFlags;
 use super::terminal::style;
 use super::{Outcome, Verbosity};
 use crate::identify::{
-    CovarianceKind, FileRecords, IdentifyError, Model, Options, Order, Polish, Records, Weight,
-    identify_records,
+    CovarianceKind, FileRecords, IdentifyError, Method, Model, Options, Order, Polish, Records,
+    Stochastic, Weight, identify_records,
 };
 use crate::log::{Roles, Source};
 use crate::moments::Detrend;
@@ -66,10 +66,13 @@ struct ModelFlags {
     /// Algorithm
     #[arg(long, value_enum, default_value = "pbsid-opt")]
     method: Method,
-    /// Weight of the singular value decomposition [default: identity, or cva when units differ much]
+    /// Step that estimates K in the place of the method's own
+    #[arg(long, value_enum)]
+    stochastic: Option<Stochastic>,
+    /// Weight of the singular value decomposition [default: what suits the method]
     #[arg(long, value_enum)]
     weight: Option<WeightFlag>,
-    /// Polish to maximum likelihood: auto does when the past window is long enough for it
+    /// Polish to maximum likelihood: auto does for pbsid-opt, when the past window is long enough for it
     #[arg(long, value_enum, default_value = "auto")]
     polish: PolishFlag,
     /// Covariance: from the model, or robust against a model that is not right (from blocks of the data)
@@ -95,12 +98,6 @@ struct ModelFlags {
     /// Seed of random draws
     #[arg(long, default_value_t = 0)]
     seed: u64,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Method {
-    /// Predictor-based subspace identification, optimised
-    PbsidOpt,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -132,9 +129,9 @@ enum DetrendFlag {
 
 impl ModelFlags {
     fn options(self) -> Options {
-        // The only one so far.
-        let Method::PbsidOpt = self.method;
         Options {
+            method: self.method,
+            stochastic: self.stochastic,
             order: self.order,
             past: self.past.0,
             future: self.future.0,

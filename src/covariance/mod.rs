@@ -54,5 +54,5 @@ pub use poles::{PoleUncertainty, pole_uncertainties};
 pub use quantile::{ellipse_quantile, interval_quantile};
 pub use response::{impulse_response_std, static_gain_std, step_response_std};
 pub(crate) use subspace::jacobian_with_sign;
-pub use subspace::{subspace_covariance, subspace_jacobian};
+pub use subspace::{subspace_covariance, subspace_jacobian, subspace_propagation};
 pub use zeros::zero_uncertainties;

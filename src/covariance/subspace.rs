@@ -16,7 +16,7 @@
 use nalgebra::DMatrix;
 
 use super::parameters::{ParameterCovariance, ParameterLayout};
-use crate::identify::{Estimate, Varx};
+use crate::identify::{Estimate, Propagation, Varx};
 use crate::linalg::{
     LinalgError, multiply, multiply_nt, pseudo_inverse, solve_upper_right,
     symmetric_square_root_factor,
@@ -156,18 +156,58 @@ pub fn subspace_covariance(
     varx: &Varx,
 ) -> Result<ParameterCovariance, LinalgError> {
     let (layout, jacobian) = subspace_jacobian(estimate, varx);
-    let outputs = layout.outputs;
-    let regressors = varx.regressors();
     let parameters = layout.len();
-    // Whiten: J (R_z^-1 over j, chol(Lambda) over o), so that the covariance is a product with its
-    // transpose, positive semidefinite by construction.
+    let mut covariance = DMatrix::zeros(parameters, parameters);
+    for whitened in whitened(&jacobian, varx)? {
+        covariance += multiply_nt(&whitened, &whitened);
+    }
+    // Exactly symmetric, whatever the order of summation.
+    let covariance = (&covariance + covariance.transpose()) * 0.5;
+    Ok(ParameterCovariance {
+        layout,
+        matrix: covariance,
+        degrees_of_freedom: None,
+    })
+}
+
+/// The errors behind [`subspace_covariance`] as a linear function of white noise, with those of the vector ARX
+/// coefficients.
+///
+/// # Errors
+/// [`LinalgError`] when the innovation covariance cannot be decomposed.
+pub fn subspace_propagation(estimate: &Estimate, varx: &Varx) -> Result<Propagation, LinalgError> {
+    let (_, jacobian) = subspace_jacobian(estimate, varx);
+    let of_coefficients = DMatrix::identity(jacobian.ncols(), jacobian.ncols());
+    Ok(Propagation {
+        parameters: side_by_side(&whitened(&jacobian, varx)?),
+        coefficients: side_by_side(&whitened(&of_coefficients, varx)?),
+    })
+}
+
+fn side_by_side(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
+    let rows = parts.first().map_or(0, DMatrix::nrows);
+    let mut out = DMatrix::zeros(rows, parts.iter().map(DMatrix::ncols).sum());
+    let mut from = 0;
+    for part in parts {
+        out.columns_mut(from, part.ncols()).copy_from(part);
+        from += part.ncols();
+    }
+    out
+}
+
+/// `J (R_z^-1 over j, chol(Lambda) over o)`, one part a direction of the noise: a covariance is the sum of the
+/// products of the parts with their transposes, positive semidefinite by construction.
+fn whitened(jacobian: &DMatrix<f64>, varx: &Varx) -> Result<Vec<DMatrix<f64>>, LinalgError> {
+    let outputs = varx.coefficients.nrows();
+    let regressors = varx.regressors();
+    let parameters = jacobian.nrows();
     let noise = symmetric_square_root_factor(&varx.innovation_covariance)?;
     let inverse = if varx.dependent {
         Some(pseudo_inverse(&varx.regressor_factor, 1e-12)?)
     } else {
         None
     };
-    let mut covariance = DMatrix::zeros(parameters, parameters);
+    let mut parts = Vec::with_capacity(outputs);
     for direction in 0..outputs {
         let mut mixed = DMatrix::zeros(parameters, regressors);
         for j in 0..regressors {
@@ -180,17 +220,10 @@ pub fn subspace_covariance(
                 );
             }
         }
-        let whitened = match &inverse {
+        parts.push(match &inverse {
             Some(inverse) => multiply(&mixed, inverse),
             None => solve_upper_right(&mixed, &varx.regressor_factor),
-        };
-        covariance += multiply_nt(&whitened, &whitened);
+        });
     }
-    // Exactly symmetric, whatever the order of summation.
-    let covariance = (&covariance + covariance.transpose()) * 0.5;
-    Ok(ParameterCovariance {
-        layout,
-        matrix: covariance,
-        degrees_of_freedom: None,
-    })
+    Ok(parts)
 }

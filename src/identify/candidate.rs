@@ -1,24 +1,25 @@
 //! One order, estimated, polished and tested.
 
+use std::sync::Arc;
+
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::error::IdentifyError;
-use super::pbsid_opt::{Decomposition, Estimate, system_matrices};
+use super::method::{Decomposed, Estimated, Windows};
 use super::polish::{Effort, Polished, polish};
+use super::source::Source;
 use super::stable::with_stable_predictor;
 use super::truncation::{state_covariance, truncation};
-use super::varx::Varx;
 use crate::model::StateSpace;
-use crate::moments::RFactor;
 
 /// A model of one order with what was learnt about it.
 #[derive(Debug, Clone)]
 pub struct Candidate {
     /// Order.
     pub order: usize,
-    /// PBSID_opt.
-    pub estimate: Estimate,
+    /// The estimate of the method.
+    pub estimate: Arc<dyn Estimated>,
     /// Maximum likelihood, when it was tried. An iteration that did not converge has still gone downhill: its
     /// cost is an upper bound of the smallest.
     pub polished: Option<Polished>,
@@ -31,53 +32,45 @@ pub struct Candidate {
 }
 
 /// Everything that candidates of one past window share.
-#[derive(Debug, Clone, Copy)]
-pub struct Window<'a> {
-    /// Data.
-    pub factor: &'a RFactor,
-    /// Vector ARX estimate.
-    pub varx: &'a Varx,
-    /// Sample time.
-    pub sample_time: f64,
+#[derive(Debug, Clone)]
+pub struct Window {
+    /// Data, with the weight; the future window depends on the order.
+    pub windows: Windows,
     /// Whether candidates are polished.
     pub polish: bool,
     /// And how far.
     pub effort: Effort,
 }
 
-impl Window<'_> {
+impl Window {
     /// Estimates one order.
     ///
     /// # Errors
     /// [`IdentifyError::SingularRegression`] for an order that the data do not support.
     pub fn candidate(
         &self,
-        decomposition: &Decomposition,
+        decomposition: &dyn Decomposed,
         order: usize,
+        source: &mut Source<'_>,
     ) -> Result<Candidate, IdentifyError> {
-        let estimate = system_matrices(
-            self.factor,
-            self.varx,
-            decomposition,
-            decomposition.state_map(order),
-            self.sample_time,
-        )?;
+        let estimate = decomposition.estimate(order, source)?;
+        let varx = &self.windows.varx;
         let polished = if self.polish {
-            polish(&estimate.system, self.varx, None, self.effort).ok()
+            polish(estimate.system(), varx, None, self.effort).ok()
         } else {
             None
         };
-        let innovation_covariance = &self.varx.innovation_covariance;
-        let best = polished.as_ref().map_or(&estimate.system, |p| &p.system);
+        let innovation_covariance = &varx.innovation_covariance;
+        let best = polished.as_ref().map_or(estimate.system(), |p| &p.system);
         let predictor =
             with_stable_predictor(best, innovation_covariance).unwrap_or_else(|| best.clone());
-        let state_covariance = state_covariance(&predictor, self.varx);
+        let state_covariance = state_covariance(&predictor, varx);
         let truncation = truncation(
             &predictor,
             &state_covariance,
             innovation_covariance,
-            self.varx.past,
-            self.varx.columns,
+            varx.past,
+            varx.columns,
         )
         .unwrap_or(f64::INFINITY);
         Ok(Candidate {

@@ -2,7 +2,7 @@
 
 use super::delay::Aligner;
 use super::error::IdentifyError;
-use super::options::{CovarianceKind, Options};
+use super::options::Options;
 use super::records::Records;
 use crate::log::Channel;
 use crate::moments::{
@@ -46,7 +46,7 @@ impl Data {
         let (inputs, outputs) = (records.inputs().len(), records.outputs().len());
         let q = inputs + outputs;
         let delays = input_delays(&options.input_delay, inputs)?;
-        let robust = options.covariance == CovarianceKind::Robust;
+        let robust = options.may_need_blocks();
         let mut experiments = Vec::new();
         let mut blocks = Vec::new();
         let per_experiment = JACKKNIFE_BLOCKS.div_ceil(records.experiments());

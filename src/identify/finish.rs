@@ -4,11 +4,12 @@ use super::candidate::cost_p_value;
 use super::data::Data;
 use super::error::IdentifyError;
 use super::fit::Fit;
+use super::method::Estimated;
 use super::options::{CovarianceKind, Options, Order, Polish};
-use super::pbsid_opt::{Estimate, Weight, decompose, system_matrices};
 use super::polish::{Effort, Polished, coefficient_cost, polish};
 use super::scaling;
 use super::select::{Selection, Windowed};
+use super::source::Source;
 use super::stable::{largest_stable_radius, stabilised, with_poles_inside, with_stable_predictor};
 use super::summary::{
     Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
@@ -16,7 +17,7 @@ use super::summary::{
 use super::truncation::LARGEST_FOR_POLISH;
 use super::varx::{Varx, varx};
 use super::warnings;
-use crate::covariance::{ParameterCovariance, jackknife_covariance, subspace_covariance};
+use crate::covariance::{ParameterCovariance, ParameterLayout, jackknife_covariance};
 use crate::linalg::spectral_radius;
 use crate::model::StateSpace;
 
@@ -43,7 +44,12 @@ pub struct Chosen {
 ///
 /// # Errors
 /// [`IdentifyError::NoStableModel`], or too few blocks for the jackknife.
-pub fn finish(options: &Options, data: &Data, chosen: Chosen) -> Result<Fit, IdentifyError> {
+pub fn finish(
+    options: &Options,
+    data: &Data,
+    source: &Source<'_>,
+    chosen: Chosen,
+) -> Result<Fit, IdentifyError> {
     let Chosen {
         windowed,
         selection,
@@ -67,10 +73,13 @@ pub fn finish(options: &Options, data: &Data, chosen: Chosen) -> Result<Fit, Ide
     let use_polish = match options.polish {
         Polish::Never => false,
         Polish::Always => true,
-        Polish::Auto => candidate.polished.as_ref().is_some_and(|p| {
-            candidate.truncation <= LARGEST_FOR_POLISH
-                || p.start_cost - p.cost > GAIN_OVER_TRUNCATION * candidate.truncation
-        }),
+        Polish::Auto => {
+            options.polishes_by_default()
+                && candidate.polished.as_ref().is_some_and(|p| {
+                    candidate.truncation <= LARGEST_FOR_POLISH
+                        || p.start_cost - p.cost > GAIN_OVER_TRUNCATION * candidate.truncation
+                })
+        }
     };
     let polished = candidate.polished.filter(|_| use_polish);
     let order_test = polished.as_ref().map(|p| OrderTest {
@@ -83,11 +92,16 @@ pub fn finish(options: &Options, data: &Data, chosen: Chosen) -> Result<Fit, Ide
         ),
     });
     let estimate = candidate.estimate;
-    let (mut system, mut covariance) = match &polished {
-        Some(p) => (p.system.clone(), p.covariance.clone()),
+    let (mut system, mut covariance, mut innovation_covariance) = match &polished {
+        Some(p) => (
+            p.system.clone(),
+            Some(p.covariance.clone()),
+            varx.innovation_covariance.clone(),
+        ),
         None => (
-            estimate.system.clone(),
-            subspace_covariance(&estimate, &varx)?,
+            estimate.system().clone(),
+            estimate.covariance()?,
+            estimate.innovation_covariance().clone(),
         ),
     };
 
@@ -95,45 +109,56 @@ pub fn finish(options: &Options, data: &Data, chosen: Chosen) -> Result<Fit, Ide
     if options.stable {
         let made = make_stable(&system, &varx)?;
         if let Some((stable, stable_covariance, cost)) = made {
+            if stable_covariance.is_some() {
+                // Polished under the constraint.
+                innovation_covariance = varx.innovation_covariance.clone();
+                covariance = stable_covariance;
+            }
             system = stable;
-            covariance = stable_covariance.unwrap_or(covariance);
             stability = cost;
         }
     }
 
     // The covariance is that of the estimated gain; the transfer from inputs to outputs does not depend on it.
-    let mirrored = with_stable_predictor(&system, &varx.innovation_covariance);
+    let mirrored = with_stable_predictor(&system, &innovation_covariance);
     let predictor_mirrored = mirrored.is_some();
     system = mirrored.unwrap_or(system);
 
     let mut jackknife_blocks = None;
-    if options.covariance == CovarianceKind::Robust {
+    let by_formula = covariance.filter(|_| options.covariance == CovarianceKind::Model);
+    let covariance = if let Some(covariance) = by_formula {
+        covariance
+    } else {
         let replicates = replicates(
-            data,
+            source,
             options,
             &Replicated {
-                estimate: &estimate,
+                estimate: estimate.as_ref(),
                 system: &system,
                 polished: polished.is_some(),
                 past: factor.past,
-                future,
-                weight,
             },
         );
         jackknife_blocks = Some(replicates.len());
-        let layout = covariance.layout;
+        let layout = ParameterLayout {
+            states: order,
+            inputs: factor.inputs,
+            outputs,
+            feedthrough: varx.feedthrough,
+        };
         let replicates: Vec<Vec<f64>> = replicates.iter().map(|s| layout.pack(s)).collect();
-        covariance = jackknife_covariance(layout, &replicates).ok_or_else(|| {
+        jackknife_covariance(layout, &replicates).ok_or_else(|| {
             IdentifyError::Option(format!(
                 "--covariance robust needs at least 3 blocks of data, and only {} could be made: give a longer \
                  recording, a smaller --past, or --covariance model",
                 replicates.len()
             ))
-        })?;
-    }
+        })?
+    };
 
     let mut summary = Summary {
-        method: "pbsid-opt".to_owned(),
+        method: options.method,
+        stochastic: options.stochastic,
         weight,
         polished: polished.is_some(),
         order,
@@ -187,7 +212,7 @@ pub fn finish(options: &Options, data: &Data, chosen: Chosen) -> Result<Fit, Ide
         system: scaling::system_in_user_units(&system, &data.scale),
         covariance: scaling::covariance_in_user_units(&covariance, &data.scale),
         innovation_covariance: scaling::innovation_in_user_units(
-            &varx.innovation_covariance,
+            &innovation_covariance,
             &data.scale[factor.inputs..],
         ),
         levels: data.levels.clone(),
@@ -250,32 +275,31 @@ fn make_stable(system: &StateSpace, varx: &Varx) -> Result<Option<MadeStable>, I
 
 /// What is estimated again without each block.
 struct Replicated<'a> {
-    estimate: &'a Estimate,
+    estimate: &'a dyn Estimated,
     system: &'a StateSpace,
     polished: bool,
     past: usize,
-    future: usize,
-    weight: Weight,
 }
 
-/// The model without each block of the jackknife, all in the same basis: the map to the state stays that
-/// of all data, and the polish starts from the model of all data.
-fn replicates(data: &Data, options: &Options, of: &Replicated<'_>) -> Vec<StateSpace> {
-    data.factors_without_blocks(of.past)
+/// The model without each block of the jackknife, all in the same basis: a method keeps its map to the state, and
+/// the polish starts from the model of all data.
+fn replicates(source: &Source<'_>, options: &Options, of: &Replicated<'_>) -> Vec<StateSpace> {
+    let window = if of.polished {
+        of.past
+    } else {
+        of.estimate.window()
+    };
+    source
+        .factors_without_blocks(window)
         .iter()
         .filter_map(|part| {
-            let part_varx = varx(part, options.feedthrough).ok()?;
             if of.polished {
+                let part_varx = varx(part, options.feedthrough).ok()?;
                 return polish(of.system, &part_varx, None, Effort::Full)
                     .ok()
                     .map(|p| p.system);
             }
-            let decomposition = decompose(part, &part_varx, of.future, of.weight).ok()?;
-            let map = of.estimate.state_map.clone();
-            let time = of.system.sample_time;
-            system_matrices(part, &part_varx, &decomposition, map, time)
-                .ok()
-                .map(|e| e.system)
+            of.estimate.replicate(part).ok()
         })
         .collect()
 }

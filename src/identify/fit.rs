@@ -1,5 +1,7 @@
 //! From recordings to system matrices with their covariance: windows, order, estimate, polish.
 
+use std::sync::Arc;
+
 use nalgebra::DMatrix;
 
 use super::data::Data;
@@ -9,6 +11,7 @@ use super::horizon;
 use super::options::{Options, Order};
 use super::records::Records;
 use super::select::{Windowed, propose, select};
+use super::source::Source;
 use super::summary::{PastEvidence, Summary};
 use super::truncation::past_for_truncation;
 use super::varx::varx;
@@ -54,26 +57,29 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
     let longest = horizon::LONGEST_PAST_ON_DEMAND
         .min((LARGEST_AUTOMATIC_FACTOR / q).saturating_sub(1))
         .max(1);
-    let data = Data::read(records, options, options.past.unwrap_or(longest))?;
-    let sample_time = records.sample_time();
+    let longest = options.past.unwrap_or(longest);
+    let lags = options.method.lags(longest, options.future);
+    let data = Data::read(records, options, lags)?;
+    let longest = longest.min(data.lags());
 
     let mut explanation = Vec::new();
     let (past, past_windows) = match options.past {
         Some(past) => (past, Vec::new()),
-        None => choose_past(&data, records, options, &mut explanation)?,
+        None => choose_past(&data, records, options, longest, &mut explanation)?,
     };
-    let mut chosen = windowed(&data, records, past, options)?;
+    let mut source = Source::new(&data, records);
+    let mut chosen = windowed(&mut source, past, options)?;
     // While the past window is too short the tests of the order have no meaning: they wait until it is chosen.
     let mut selection = if options.past.is_none() {
-        propose(&chosen, options, sample_time)?
+        propose(&chosen, options, &mut source)?
     } else {
-        select(&chosen, options, sample_time)?
+        select(&chosen, options, &mut source)?
     };
 
     if options.past.is_none() {
         // The past window must be long enough for the predictor of the model that it leads to.
         let samples = data.samples;
-        let limit = horizon::longest_past(samples, q, data.lags()).max(chosen.factor.past);
+        let limit = horizon::longest_past(samples, q, longest).max(chosen.factor.past);
         for _ in 0..4 {
             let past = chosen.factor.past;
             if selection.noise_free
@@ -94,18 +100,19 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
             .unwrap_or(limit)
             // An estimate of the decay from a short window is not to be trusted far beyond it.
             .min(2 * past + 2);
-            chosen = windowed(&data, records, wanted, options)?;
-            selection = propose(&chosen, options, sample_time)?;
+            chosen = windowed(&mut source, wanted, options)?;
+            selection = propose(&chosen, options, &mut source)?;
             explanation.retain(|line| !line.starts_with("past window lengthened"));
             explanation.push(format!(
                 "past window lengthened to {wanted} so that what it cuts off no longer matters"
             ));
         }
-        selection = select(&chosen, options, sample_time)?;
+        selection = select(&chosen, options, &mut source)?;
     }
     finish(
         options,
         &data,
+        &source,
         Chosen {
             windowed: chosen,
             selection,
@@ -132,6 +139,7 @@ fn check_windows(options: &Options, q: usize, outputs: usize) -> Result<(), Iden
     }
     if let (Some(past), Some(future)) = (past, future)
         && future > past
+        && !options.method.allows_longer_future()
     {
         return wrong("the future window cannot be longer than the past window".to_owned());
     }
@@ -178,21 +186,12 @@ fn check_windows(options: &Options, q: usize, outputs: usize) -> Result<(), Iden
 }
 
 fn windowed(
-    data: &Data,
-    records: &mut dyn Records,
+    source: &mut Source<'_>,
     past: usize,
     options: &Options,
 ) -> Result<Windowed, IdentifyError> {
-    let q = data.channels();
-    if data.samples <= past {
-        return Err(IdentifyError::TooShort {
-            samples: data.samples,
-            past,
-            needed: past * (q + 1) + records.outputs().len() + 1,
-        });
-    }
-    let factor = data.factor(records, past)?;
-    let varx = varx(&factor, options.feedthrough)?;
+    let factor = source.factor(past)?;
+    let varx = Arc::new(varx(&factor, options.feedthrough)?);
     Ok(Windowed { factor, varx })
 }
 
@@ -200,22 +199,28 @@ fn choose_past(
     data: &Data,
     records: &mut dyn Records,
     options: &Options,
+    longest: usize,
     explanation: &mut Vec<String>,
 ) -> Result<(usize, Vec<PastEvidence>), IdentifyError> {
     let q = data.channels();
     let outputs = records.outputs().len();
-    let limit = horizon::longest_past(data.samples, q, horizon::LONGEST_PAST.min(data.lags()));
+    let limit = horizon::longest_past(data.samples, q, horizon::LONGEST_PAST.min(longest));
     // An order or a future window that was asked for must fit in.
-    let smallest = options
-        .order
-        .largest()
-        .div_ceil(outputs)
-        .max(options.future.unwrap_or(1));
-    let limit = limit.max(smallest).min(data.lags());
+    let smallest =
+        options
+            .order
+            .largest()
+            .div_ceil(outputs)
+            .max(if options.method.allows_longer_future() {
+                1
+            } else {
+                options.future.unwrap_or(1)
+            });
+    let limit = limit.max(smallest).min(longest);
     if smallest > limit || smallest * (q + 1) + outputs >= data.samples {
         let order = options.order.largest();
         // The past window that the recording allows, with more windows than regressors.
-        let largest = (data.samples.saturating_sub(outputs + 1) / (q + 1)).min(data.lags());
+        let largest = (data.samples.saturating_sub(outputs + 1) / (q + 1)).min(longest);
         return Err(if order.div_ceil(outputs) >= smallest {
             IdentifyError::Order {
                 order,

@@ -7,7 +7,9 @@
 //! | `records`, `delay`, `data` | recordings, streamed once, aligned, as moments | |
 //! | `horizon` | past window by Akaike's criterion, future window | |
 //! | `varx` | the high-order vector ARX model | van Wingerden (22)-(23) |
+//! | `method` | which algorithm: one enum variant and one module each | |
 //! | `pbsid_opt` | states by a weighted singular value decomposition, system matrices by least squares | van Wingerden (24)-(34) |
+//! | `stochastic` | `K` and `Lambda` by a step of its own, for any deterministic part | |
 //! | `order`, `select` | which order: singular values propose, a chi-square test referees | Bauer 2001 |
 //! | `truncation` | what the past window cuts off | |
 //! | `polish` | the maximum-likelihood model of that order | Soderstrom, Stoica & Friedlander 1991 |
@@ -25,6 +27,7 @@ mod error;
 mod finish;
 mod fit;
 mod horizon;
+pub mod method;
 mod model;
 mod options;
 mod order;
@@ -34,7 +37,9 @@ mod records;
 mod scaling;
 mod select;
 mod simulate;
+mod source;
 mod stable;
+pub mod stochastic;
 mod summary;
 mod truncation;
 mod varx;
@@ -43,11 +48,14 @@ mod warnings;
 pub use delay::Aligner;
 pub use error::IdentifyError;
 pub use fit::{Fit, fit};
+pub use method::{Method, Propagation};
 pub use model::{IdentifiedChannel, Model, identify, identify_records};
 pub use options::{CovarianceKind, Options, Order, Polish};
 pub use order::OrderEvidence;
 pub use pbsid_opt::{Decomposition, Estimate, Weight, decompose, system_matrices};
 pub use polish::{Effort, Polished, coefficient_cost, polish, predictor_coefficients};
 pub use records::{FileRecords, MemoryRecords, ReadProgress, Recording, Records};
+pub use source::Source;
+pub use stochastic::Stochastic;
 pub use summary::{Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary};
 pub use varx::{Varx, varx};

@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::method::Method;
 use super::pbsid_opt::Weight;
+use super::stochastic::Stochastic;
 use crate::moments::Detrend;
 
 /// Which state dimension.
@@ -34,12 +36,13 @@ impl Order {
 )]
 #[serde(rename_all = "lowercase")]
 pub enum Polish {
-    /// When the past window is long enough for it (the truncation measure says so).
+    /// PBSID_opt when the past window is long enough for it (the truncation measure says so); other methods
+    /// and stochastic steps were asked for by name, and keep their own numbers.
     #[default]
     Auto,
     /// Whatever the truncation.
     Always,
-    /// Not at all: plain PBSID_opt with its own covariance.
+    /// Not at all: the plain method with its own covariance.
     Never,
 }
 
@@ -59,14 +62,18 @@ pub enum CovarianceKind {
 /// Options of [`identify`](super::identify()); the default is what the command line does without flags.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Options {
+    /// Algorithm.
+    pub method: Method,
+    /// Step that estimates `K` and `Lambda`; `None` is the method's own.
+    pub stochastic: Option<Stochastic>,
     /// State dimension.
     pub order: Order,
     /// Past window `p`; `None` chooses.
     pub past: Option<usize>,
-    /// Future window `f <= p`; `None` chooses.
+    /// Future window `f` (at most `p` for PBSID_opt); `None` chooses.
     pub future: Option<usize>,
-    /// Weight of the singular value decomposition; `None` is the identity, unless the innovations of
-    /// the outputs differ so much in size that their units would decide.
+    /// Weight of the singular value decomposition; `None` is what the method prefers: the identity, unless the
+    /// innovations of the outputs differ so much in size that their units would decide.
     pub weight: Option<Weight>,
     /// Maximum-likelihood polish.
     pub polish: Polish,
@@ -82,4 +89,27 @@ pub struct Options {
     pub stable: bool,
     /// Seed of everything drawn (confidence bounds by draws).
     pub seed: u64,
+}
+
+impl Options {
+    /// Whether `--polish auto` polishes.
+    pub(super) fn polishes_by_default(&self) -> bool {
+        self.method.polishes_by_default() && self.stochastic.is_none()
+    }
+
+    /// Whether the covariance is, or may have to be, that of the jackknife.
+    pub(super) fn may_need_blocks(&self) -> bool {
+        let formula =
+            self.method.has_covariance() && self.stochastic.is_none_or(Stochastic::has_covariance);
+        self.covariance == CovarianceKind::Robust || !(formula || self.polish == Polish::Always)
+    }
+
+    /// Whether the model may be polished at all.
+    pub(super) fn may_polish(&self) -> bool {
+        match self.polish {
+            Polish::Never => false,
+            Polish::Always => true,
+            Polish::Auto => self.polishes_by_default(),
+        }
+    }
 }

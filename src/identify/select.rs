@@ -1,12 +1,16 @@
 //! Choice of the order, with everything that speaks for it.
 
+use std::sync::Arc;
+
 use super::candidate::{Candidate, Window, cost_p_value};
 use super::error::IdentifyError;
 use super::horizon;
-use super::options::{Options, Order, Polish};
+use super::method::{Decomposed, Windows};
+use super::options::{Options, Order};
 use super::order::{self, OrderEvidence};
-use super::pbsid_opt::{Decomposition, Weight, decompose};
+use super::pbsid_opt::{Weight, decompose};
 use super::polish::Effort;
+use super::source::Source;
 use super::varx::Varx;
 use crate::linalg::spectral_radius;
 use crate::moments::RFactor;
@@ -20,9 +24,9 @@ const NOISE_FREE: f64 = 1e-16;
 /// The data factor of a past window with its vector ARX model.
 pub struct Windowed {
     /// Data.
-    pub factor: RFactor,
+    pub factor: Arc<RFactor>,
     /// Vector ARX estimate.
-    pub varx: Varx,
+    pub varx: Arc<Varx>,
 }
 
 /// The chosen order with everything that spoke for it.
@@ -50,9 +54,9 @@ pub struct Selection {
 pub fn propose(
     windowed: &Windowed,
     options: &Options,
-    sample_time: f64,
+    source: &mut Source<'_>,
 ) -> Result<Selection, IdentifyError> {
-    select_by(windowed, options, sample_time, true)
+    select_by(windowed, options, source, true)
 }
 
 /// Estimates the orders that come into question and chooses among them.
@@ -62,15 +66,15 @@ pub fn propose(
 pub fn select(
     windowed: &Windowed,
     options: &Options,
-    sample_time: f64,
+    source: &mut Source<'_>,
 ) -> Result<Selection, IdentifyError> {
-    select_by(windowed, options, sample_time, false)
+    select_by(windowed, options, source, false)
 }
 
 fn select_by(
     windowed: &Windowed,
     options: &Options,
-    sample_time: f64,
+    source: &mut Source<'_>,
     proposal_only: bool,
 ) -> Result<Selection, IdentifyError> {
     let Windowed { factor, varx } = windowed;
@@ -80,18 +84,12 @@ fn select_by(
         .diagonal()
         .iter()
         .any(|v| *v < NOISE_FREE);
-    let polish = !noise_free && options.polish != Polish::Never;
-    // The referee of the order needs a polished cost also when no polish was asked for.
-    let referee = Window {
-        factor,
-        varx,
-        sample_time,
-        polish: !noise_free,
-        effort: Effort::Referee,
-    };
-    let weight = options
-        .weight
-        .unwrap_or_else(|| automatic_weight(factor, varx));
+    let polish = !noise_free && options.may_polish();
+    let weight = options.weight.unwrap_or_else(|| {
+        options
+            .method
+            .default_weight(automatic_weight(factor, varx))
+    });
     let largest = order::LARGEST_AUTOMATIC_ORDER.max(options.order.largest());
     let future_for_choice = options
         .future
@@ -108,9 +106,20 @@ fn select_by(
     );
 
     let mut estimator = Estimator {
-        window: referee,
-        weight,
-        future: options.future,
+        // The referee of the order needs a polished cost also when no polish was asked for.
+        window: Window {
+            windows: Windows {
+                factor: Arc::clone(factor),
+                varx: Arc::clone(varx),
+                future: future_for_choice,
+                weight,
+                sample_time: source.sample_time(),
+            },
+            polish: !noise_free,
+            effort: Effort::Referee,
+        },
+        options,
+        source,
         decompositions: Vec::new(),
         candidates: Vec::new(),
     };
@@ -139,7 +148,7 @@ fn select_by(
     Ok(Selection {
         future,
         candidate,
-        singular_values: estimator.decomposition(future)?.singular_values.clone(),
+        singular_values: estimator.decomposition(future)?.singular_values().to_vec(),
         weight,
         evidence,
         explanation,
@@ -148,15 +157,15 @@ fn select_by(
 }
 
 /// Estimates orders of one past window, each once, and decomposes each future window once.
-struct Estimator<'a> {
-    window: Window<'a>,
-    weight: Weight,
-    future: Option<usize>,
-    decompositions: Vec<(usize, Decomposition)>,
+struct Estimator<'a, 'b> {
+    window: Window,
+    options: &'a Options,
+    source: &'a mut Source<'b>,
+    decompositions: Vec<(usize, Arc<dyn Decomposed>)>,
     candidates: Vec<Candidate>,
 }
 
-impl Estimator<'_> {
+impl Estimator<'_, '_> {
     /// From here on candidates are final: what the referee was content with is estimated again.
     fn for_good(&mut self, polish: bool) {
         let converged = |c: &Candidate| c.polished.as_ref().is_some_and(|p| p.converged);
@@ -166,23 +175,27 @@ impl Estimator<'_> {
     }
 
     fn future_for(&self, order: usize) -> usize {
-        let factor = self.window.factor;
-        self.future
+        let factor = &self.window.windows.factor;
+        self.options
+            .future
             .unwrap_or_else(|| horizon::future_for_order(factor.past, factor.outputs, order))
     }
 
-    fn decomposition(&mut self, future: usize) -> Result<&Decomposition, IdentifyError> {
-        let known = self.decompositions.iter().position(|(f, _)| *f == future);
-        let index = match known {
-            Some(index) => index,
-            None => {
-                let Window { factor, varx, .. } = self.window;
-                let made = decompose(factor, varx, future, self.weight)?;
-                self.decompositions.push((future, made));
-                self.decompositions.len() - 1
-            }
+    fn decomposition(&mut self, future: usize) -> Result<Arc<dyn Decomposed>, IdentifyError> {
+        if let Some((_, known)) = self.decompositions.iter().find(|(f, _)| *f == future) {
+            return Ok(Arc::clone(known));
+        }
+        let windows = Windows {
+            future,
+            ..self.window.windows.clone()
         };
-        Ok(&self.decompositions[index].1)
+        let own = self.options.method.decompose(&windows, self.source)?;
+        let made = match self.options.stochastic {
+            Some(step) => step.instead_of_own(own, windows),
+            None => own,
+        };
+        self.decompositions.push((future, Arc::clone(&made)));
+        Ok(made)
     }
 
     fn candidate(&mut self, order: usize) -> Result<&Candidate, IdentifyError> {
@@ -190,7 +203,6 @@ impl Estimator<'_> {
         let index = match known {
             Some(index) => index,
             None => {
-                let window = self.window;
                 let decomposition = self.decomposition(self.future_for(order))?;
                 let possible = decomposition.largest_order();
                 if order > possible {
@@ -201,7 +213,9 @@ impl Estimator<'_> {
                             .to_owned(),
                     });
                 }
-                let made = window.candidate(decomposition, order)?;
+                let made = self
+                    .window
+                    .candidate(decomposition.as_ref(), order, self.source)?;
                 self.candidates.push(made);
                 self.candidates.len() - 1
             }
@@ -238,8 +252,8 @@ fn note(evidence: &mut Vec<OrderEvidence>, candidate: &Candidate, varx: &Varx) {
                 canonical_correlation: 0.0,
                 singular_value_criterion: order::penalty(
                     candidate.order,
-                    candidate.estimate.system.inputs(),
-                    candidate.estimate.system.outputs(),
+                    candidate.estimate.system().inputs(),
+                    candidate.estimate.system().outputs(),
                     varx.columns,
                 ),
                 chi_square: None,
@@ -255,7 +269,7 @@ fn note(evidence: &mut Vec<OrderEvidence>, candidate: &Candidate, varx: &Varx) {
     let system = candidate
         .polished
         .as_ref()
-        .map_or(&candidate.estimate.system, |p| &p.system);
+        .map_or(candidate.estimate.system(), |p| &p.system);
     entry.spectral_radius = spectral_radius(&system.a).ok();
     let Some(polished) = &candidate.polished else {
         return;
@@ -290,7 +304,7 @@ fn best_by_schwarz(
 fn choose_order(
     evidence: &mut Vec<OrderEvidence>,
     varx: &Varx,
-    estimator: &mut Estimator<'_>,
+    estimator: &mut Estimator<'_, '_>,
 ) -> (usize, String) {
     let proposal = order::proposal(evidence).unwrap_or(1);
     let largest = evidence.len().max(1);

@@ -2,9 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::method::Method;
 use super::options::{CovarianceKind, Polish};
 use super::order::OrderEvidence;
 use super::pbsid_opt::Weight;
+use super::stochastic::Stochastic;
 use crate::moments::{Detrend, Route};
 
 /// Akaike's criterion of one past window.
@@ -109,7 +111,10 @@ pub struct Diagnostics {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Summary {
     /// Algorithm.
-    pub method: String,
+    pub method: Method,
+    /// Step that estimated `K` and `Lambda`; absent when it was the method's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stochastic: Option<Stochastic>,
     /// Weight of the singular value decomposition.
     pub weight: Weight,
     /// Whether the final numbers are those of the polish.

@@ -101,6 +101,24 @@ impl RFactor {
         self.inputs + self.outputs
     }
 
+    /// The factor of the first `past + 1` blocks of the same windows, those after them being left out.
+    pub fn leading(&self, past: usize) -> RFactor {
+        let past = past.min(self.past);
+        let order = (past + 1) * self.channels();
+        let r = self.r.view((0, 0), (order, order)).into_owned();
+        RFactor {
+            past,
+            reciprocal_condition: if past == self.past {
+                self.reciprocal_condition
+            } else {
+                reciprocal_condition_upper(&r)
+            },
+            r,
+            scale: self.scale.clone(),
+            ..*self
+        }
+    }
+
     /// The factor for a shorter past window over the *same* windows: the oldest blocks are dropped and
     /// the rest is made triangular again.
     pub fn shortened(&self, past: usize) -> RFactor {
@@ -151,6 +169,15 @@ mod tests {
         let factor = RFactor::from_gram(&gram(), 1, &[1.0; 3]).unwrap();
         let short = factor.shortened(1);
         let expected = gram().gram.view((6, 6), (6, 6)).into_owned();
+        approx::assert_relative_eq!(short.r.transpose() * &short.r, expected, epsilon = 1e-8);
+    }
+
+    #[test]
+    fn leading_factor_is_that_of_the_first_blocks() {
+        let factor = RFactor::from_gram(&gram(), 1, &[1.0; 3]).unwrap();
+        let short = factor.leading(1);
+        assert_eq!((short.past, short.columns), (1, 40));
+        let expected = gram().gram.view((0, 0), (6, 6)).into_owned();
         approx::assert_relative_eq!(short.r.transpose() * &short.r, expected, epsilon = 1e-8);
     }
 

@@ -9,7 +9,9 @@ use super::json::to_json;
 use super::matrix::Rows;
 use super::packed::CovarianceDocument;
 use crate::covariance::{Root, StaticGain, invariants};
-use crate::identify::{Asked, Diagnostics, Horizons, IdentifiedChannel, Model, Recording, Weight};
+use crate::identify::{
+    Asked, Diagnostics, Horizons, IdentifiedChannel, Method, Model, Recording, Stochastic, Weight,
+};
 use crate::model::Armax;
 use crate::validate::Validation;
 
@@ -67,7 +69,10 @@ pub struct ModelDocument {
     pub covariance: Option<CovarianceDocument>,
     /// Algorithm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub method: Option<String>,
+    pub method: Option<Method>,
+    /// Step that estimated `K` and `innovation_covariance`; absent when it was the method's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stochastic: Option<Stochastic>,
     /// Weight of the singular value decomposition.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weight: Option<Weight>,
@@ -190,7 +195,8 @@ impl ModelDocument {
             innovation_covariance: innovation_covariance.as_ref().map(Into::into),
             x0: Some(initial_state.as_slice().to_vec()),
             covariance: covariance.as_ref().map(Into::into),
-            method: summary.as_ref().map(|s| s.method.clone()),
+            method: summary.as_ref().map(|s| s.method),
+            stochastic: summary.as_ref().and_then(|s| s.stochastic),
             weight: summary.as_ref().map(|s| s.weight),
             polished: summary.as_ref().map(|s| s.polished),
             order: summary.as_ref().map(|s| s.order),

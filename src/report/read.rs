@@ -334,7 +334,8 @@ fn channels<D: Clone>(
 /// How the model came about, when the document says all of it.
 fn summary(document: &ModelDocument) -> Option<Summary> {
     Some(Summary {
-        method: document.method.clone()?,
+        method: document.method?,
+        stochastic: document.stochastic,
         weight: document.weight?,
         polished: document.polished?,
         order: document.order?,

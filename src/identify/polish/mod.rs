@@ -18,7 +18,7 @@ mod predictor;
 use nalgebra::DMatrix;
 
 use self::linearised::{boundary_gradient, linearise};
-use self::predictor::Problem;
+pub(super) use self::predictor::Problem;
 pub use self::predictor::predictor_coefficients;
 use super::stable::{with_poles_inside, with_stable_predictor};
 use super::varx::Varx;

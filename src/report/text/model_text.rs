@@ -140,17 +140,22 @@ fn how(summary: &Summary) -> String {
         summary.options.covariance,
         summary.diagnostics.jackknife_blocks,
     ) {
-        (CovarianceKind::Model, _) => "covariance from the model".to_owned(),
-        (CovarianceKind::Robust, Some(blocks)) => {
+        (CovarianceKind::Model, None) => "covariance from the model".to_owned(),
+        (_, Some(blocks)) => {
             format!("covariance from {blocks} blocks of the data (jackknife)")
         }
         (CovarianceKind::Robust, None) => "robust covariance".to_owned(),
     };
+    let stochastic = summary
+        .stochastic
+        .map_or(String::new(), |step| format!(" with K by {}", step.name()));
     out.push_str(&wrapped(
         "  ",
         &format!(
-            "{}, past window {}, future window {}, {polish}; {covariance}",
-            summary.method, summary.horizons.past, summary.horizons.future
+            "{}{stochastic}, past window {}, future window {}, {polish}; {covariance}",
+            summary.method.name(),
+            summary.horizons.past,
+            summary.horizons.future
         ),
     ));
     out

@@ -1,0 +1,196 @@
+//! Methods: from the data of one past and one future window to a model of a given order.
+//!
+//! A method is one variant of [`Method`] and one module with two types: what all orders share
+//! ([`Decomposed`]) and what one order gives ([`Estimated`]). Everything else (windows, order, the chi-square
+//! referee, the polish, stability, the jackknife, units, documents) is the same for all of them.
+//!
+//! | file | method | source |
+//! |---|---|---|
+//! | `pbsid_opt` | [`Method::PbsidOpt`] | van Wingerden |
+//! | `closed_loop` | [`Method::Whitening`], [`Method::InnovationEstimation`] | Chiuso & Picci |
+
+mod pbsid_opt;
+
+use std::fmt::Debug;
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use super::error::IdentifyError;
+use super::pbsid_opt::Weight;
+use super::source::Source;
+use super::varx::Varx;
+use crate::covariance::ParameterCovariance;
+use crate::model::StateSpace;
+use crate::moments::RFactor;
+
+/// Algorithm that estimates the system matrices.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Default,
+    Serialize,
+    Deserialize,
+    schemars::JsonSchema,
+    clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Predictor-based subspace identification, optimised (van Wingerden); the first step of the
+    /// maximum-likelihood polish
+    #[default]
+    PbsidOpt,
+}
+
+impl Method {
+    /// Every method there is.
+    pub fn all() -> &'static [Self] {
+        clap::ValueEnum::value_variants()
+    }
+
+    /// The name on the command line and in documents.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PbsidOpt => "pbsid-opt",
+        }
+    }
+
+    /// Lags that the moments must hold for these windows; `future` is `None` when it is chosen later, and is at
+    /// most `past` then.
+    pub fn lags(self, past: usize, future: Option<usize>) -> usize {
+        match self {
+            Self::PbsidOpt => {
+                let _ = future;
+                past
+            }
+        }
+    }
+
+    /// Whether the future window may be longer than the past window.
+    pub fn allows_longer_future(self) -> bool {
+        match self {
+            Self::PbsidOpt => false,
+        }
+    }
+
+    /// Whether [`Estimated::covariance`] has a formula.
+    pub fn has_covariance(self) -> bool {
+        match self {
+            Self::PbsidOpt => true,
+        }
+    }
+
+    /// Whether `--polish auto` polishes. Who asks for another method by name wants that method's numbers: the
+    /// polished model is the same whatever method it started from.
+    pub fn polishes_by_default(self) -> bool {
+        self == Self::PbsidOpt
+    }
+
+    /// The weight of the singular value decomposition when none is asked for; `automatic` is what the sizes of
+    /// the innovations speak for.
+    pub fn default_weight(self, automatic: Weight) -> Weight {
+        match self {
+            Self::PbsidOpt => automatic,
+        }
+    }
+
+    /// The step that all orders share.
+    ///
+    /// # Errors
+    /// [`IdentifyError`] when the windows do not fit the data, or a factorisation fails.
+    pub fn decompose(
+        self,
+        windows: &Windows,
+        source: &mut Source<'_>,
+    ) -> Result<Arc<dyn Decomposed>, IdentifyError> {
+        match self {
+            Self::PbsidOpt => {
+                let _ = source;
+                pbsid_opt::decomposed(windows)
+            }
+        }
+    }
+}
+
+/// The data of one past window, and the future window and weight to be used.
+#[derive(Debug, Clone)]
+pub struct Windows {
+    /// Data factor of the past window, over all windows of the recordings.
+    pub factor: Arc<RFactor>,
+    /// Vector ARX estimate of the past window.
+    pub varx: Arc<Varx>,
+    /// Future window `f`.
+    pub future: usize,
+    /// Weight of the singular value decomposition.
+    pub weight: Weight,
+    /// Sample time in seconds.
+    pub sample_time: f64,
+}
+
+/// What all orders of one past and one future window share.
+pub trait Decomposed: Debug + Send + Sync {
+    /// Singular values of the weighted product, decreasing.
+    fn singular_values(&self) -> &[f64];
+
+    /// Largest order that the decomposition can give.
+    fn largest_order(&self) -> usize;
+
+    /// The model of one order, in scaled units.
+    ///
+    /// # Errors
+    /// [`IdentifyError::SingularRegression`] for an order that the data do not support.
+    fn estimate(
+        &self,
+        order: usize,
+        source: &mut Source<'_>,
+    ) -> Result<Arc<dyn Estimated>, IdentifyError>;
+}
+
+/// A model of one order, in scaled units (every channel divided by [`RFactor::scale`]).
+pub trait Estimated: Debug + Send + Sync {
+    /// System matrices.
+    fn system(&self) -> &StateSpace;
+
+    /// Covariance of the innovations.
+    fn innovation_covariance(&self) -> &DMatrix<f64>;
+
+    /// Covariance of the parameters, in the basis of [`Estimated::system`]; `None` when there is no formula: the
+    /// jackknife takes its place then.
+    ///
+    /// # Errors
+    /// [`IdentifyError::Linalg`] when a factorisation fails.
+    fn covariance(&self) -> Result<Option<ParameterCovariance>, IdentifyError>;
+
+    /// How the errors of the parameters follow from unit white noise, to first order, together with the errors of
+    /// the vector ARX coefficients; `None` when that is not known. It gives covariances to models whose
+    /// stochastic part comes from another step.
+    ///
+    /// # Errors
+    /// [`IdentifyError::Linalg`] when a factorisation fails.
+    fn propagation(&self) -> Result<Option<Propagation>, IdentifyError> {
+        Ok(None)
+    }
+
+    /// Past window of the data factor that [`Estimated::replicate`] takes.
+    fn window(&self) -> usize;
+
+    /// The model of other data (a factor of window [`Estimated::window`]) in the same state basis, for the
+    /// jackknife.
+    ///
+    /// # Errors
+    /// [`IdentifyError`] when those data do not allow it.
+    fn replicate(&self, factor: &RFactor) -> Result<StateSpace, IdentifyError>;
+}
+
+/// First-order errors as a linear function of white noise `w` of unit covariance.
+#[derive(Debug, Clone)]
+pub struct Propagation {
+    /// Errors of the parameters, `theta x w`: `Cov = P P'`.
+    pub parameters: DMatrix<f64>,
+    /// Errors of the vector ARX coefficients, `vec` of an `l x m` matrix, in the same noise.
+    pub coefficients: DMatrix<f64>,
+}
