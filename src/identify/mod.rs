@@ -27,6 +27,7 @@ mod error;
 mod finish;
 mod fit;
 mod horizon;
+pub mod knudsen;
 pub mod method;
 mod model;
 mod options;

@@ -1,5 +1,6 @@
 //! The polynomials of a single-input single-output model.
 
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -18,6 +19,36 @@ pub struct Armax {
     pub b: Vec<f64>,
     /// Numerator from the innovation, monic: characteristic polynomial of `A - K C`.
     pub c: Vec<f64>,
+}
+
+impl Armax {
+    /// The system in observer form: with coefficients `a_i`, `b_i`, `c_i` in the columns `a`, `b`, `c`,
+    /// `A = [-a [I; 0]]`, `B = b - a b0`, `K = c - a`, `C = [1 0 .. 0]`, `D = b0` (Knudsen 2001, (41) read backwards).
+    ///
+    /// Coefficients that are missing at the end of a polynomial count as zero.
+    pub fn state_space(&self, sample_time: f64) -> StateSpace {
+        let longest = self.a.len().max(self.b.len()).max(self.c.len());
+        let n = longest.max(1) - 1;
+        let at = |polynomial: &[f64], i: usize| polynomial.get(i).copied().unwrap_or(0.0);
+        let direct = at(&self.b, 0);
+        StateSpace {
+            a: DMatrix::from_fn(n, n, |i, j| {
+                let shift = if j == i + 1 { 1.0 } else { 0.0 };
+                if j == 0 {
+                    shift - at(&self.a, i + 1)
+                } else {
+                    shift
+                }
+            }),
+            b: DMatrix::from_fn(n, 1, |i, _| {
+                at(&self.b, i + 1) - at(&self.a, i + 1) * direct
+            }),
+            c: DMatrix::from_fn(1, n, |_, j| if j == 0 { 1.0 } else { 0.0 }),
+            d: DMatrix::from_element(1, 1, direct),
+            k: DMatrix::from_fn(n, 1, |i, _| at(&self.c, i + 1) - at(&self.a, i + 1)),
+            sample_time,
+        }
+    }
 }
 
 impl StateSpace {
@@ -62,7 +93,7 @@ fn monic_polynomial(roots: &[Complex64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{DMatrix, dmatrix};
+    use nalgebra::dmatrix;
 
     #[test]
     fn polynomials_give_the_frequency_responses() {
@@ -89,6 +120,46 @@ mod tests {
             let h = at(&p.c, z) / at(&p.a, z);
             assert!((g - s.frequency_response(w)[(0, 0)]).norm() < 1e-13 * g.norm());
             assert!((h - s.noise_response(w)[(0, 0)]).norm() < 1e-13 * h.norm());
+        }
+    }
+
+    #[test]
+    fn observer_form_and_back() {
+        let p = Armax {
+            a: vec![1.0, -1.5, 0.9, -0.2],
+            b: vec![0.4, 0.1, -0.3, 0.05],
+            c: vec![1.0, 0.3, -0.1, 0.02],
+        };
+        let s = p.state_space(0.5);
+        assert_eq!((s.states(), s.sample_time), (3, 0.5));
+        let back = s.armax().unwrap().unwrap();
+        for (given, found) in [(&p.a, &back.a), (&p.b, &back.b), (&p.c, &back.c)] {
+            assert_eq!(given.len(), found.len());
+            for (g, f) in given.iter().zip(found) {
+                assert!((g - f).abs() < 1e-13, "{g} {f}");
+            }
+        }
+        // Another basis has the same polynomials.
+        let t = dmatrix![1.0, 0.4, -0.2; 0.3, 2.0, 0.1; -0.5, 0.2, 1.5];
+        let moved = s.transformed(&t).unwrap().armax().unwrap().unwrap();
+        for (g, f) in p.c.iter().zip(&moved.c) {
+            assert!((g - f).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn short_polynomials_are_filled_with_zeros() {
+        let p = Armax {
+            a: vec![1.0, -0.5],
+            b: vec![0.0, 0.2, 0.1],
+            c: vec![1.0],
+        };
+        let back = p.state_space(1.0).armax().unwrap().unwrap();
+        let expected = [[1.0, -0.5, 0.0], [0.0, 0.2, 0.1], [1.0, 0.0, 0.0]];
+        for (found, expected) in [&back.a, &back.b, &back.c].iter().zip(expected) {
+            for (f, e) in found.iter().zip(expected) {
+                assert!((f - e).abs() < 1e-13);
+            }
         }
     }
 
