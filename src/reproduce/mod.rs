@@ -21,19 +21,27 @@
 //! | `document`, `figure` | what a reproduction delivers |
 //! | `study` | runs in parallel; each has its own seed, so that results depend neither on threads nor on their number |
 //! | `statistics`, `words` | percentiles and moments over runs; numbers in sentences |
+//! | `data` | the data factor of a simulated recording |
 //! | `van_wingerden` | van Wingerden: both examples |
+//! | `chiuso_picci` | Chiuso & Picci: both examples |
+//! | `knudsen` | Knudsen: all three systems |
 
+mod chiuso_picci;
+mod data;
 mod document;
 mod error;
 mod figure;
+mod knudsen;
 mod statistics;
 mod study;
 mod van_wingerden;
 mod words;
 
+pub use chiuso_picci::{ChiusoPicciOne, ChiusoPicciTwo};
 pub use document::{Agreement, Comparison, Fact, Origin, REPRODUCTION_FORMAT, Reproduction};
 pub use error::ReproduceError;
 pub use figure::{BarSeries, Bars, Curve, Figure, Panel, Quantity, Role, Row, Table};
+pub use knudsen::{KnudsenExperiment, knudsen_experiments};
 pub use study::{LEAST_RUNS, Study, on_threads};
 pub use van_wingerden::{VanWingerdenOne, VanWingerdenTwo};
 
@@ -62,7 +70,16 @@ pub trait Experiment: Sync {
 
 /// All experiments, in the order of the papers.
 pub fn experiments() -> Vec<&'static dyn Experiment> {
-    vec![&VanWingerdenOne, &VanWingerdenTwo]
+    let mut all: Vec<&'static dyn Experiment> = vec![
+        &VanWingerdenOne,
+        &VanWingerdenTwo,
+        &ChiusoPicciOne,
+        &ChiusoPicciTwo,
+    ];
+    for experiment in knudsen_experiments() {
+        all.push(experiment);
+    }
+    all
 }
 
 /// The experiment of that name.

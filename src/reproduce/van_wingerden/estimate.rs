@@ -11,7 +11,8 @@ use crate::identify::{
 };
 use crate::log::Log;
 use crate::model::StateSpace;
-use crate::moments::{Detrend, LagAccumulator, RFactor};
+pub(super) use crate::reproduce::data::Failure;
+use crate::reproduce::data::raw_factor;
 
 /// Windows and order.
 #[derive(Debug, Clone, Copy)]
@@ -29,25 +30,10 @@ pub(super) struct Subspace {
     pub(super) estimate: Estimate,
 }
 
-/// Failures of a run are counted and told, not handled: their text is enough.
-pub(super) type Failure = String;
-
 impl Subspace {
     /// Identifies from a recording.
     pub(super) fn new(log: &Log, setting: &Setting) -> Result<Self, Failure> {
-        let channels: Vec<&[f64]> = log
-            .input_data
-            .iter()
-            .chain(&log.output_data)
-            .map(Vec::as_slice)
-            .collect();
-        let mut accumulator = LagAccumulator::new(channels.len(), setting.past);
-        accumulator.push(&channels);
-        let moments = accumulator.moments();
-        let gram = moments.gram(setting.past, &moments.trend(Detrend::None));
-        let scale = vec![1.0; channels.len()];
-        let factor =
-            RFactor::from_gram(&gram, log.input_data.len(), &scale).map_err(|e| e.to_string())?;
+        let factor = raw_factor(log, setting.past)?;
         let varx = varx(&factor, false).map_err(|e| e.to_string())?;
         let decomposition: Decomposition =
             decompose(&factor, &varx, setting.future, Weight::Identity)

@@ -25,7 +25,8 @@ pub(super) struct Bounds {
     pub(super) others: f64,
     /// Predicted over Monte Carlo variance of the response.
     pub(super) variance_ratio: f64,
-    /// Root mean square of the error relative to the magnitude.
+    /// Root mean square over the runs of the error relative to the magnitude, as a geometric mean over the entries
+    /// of the response: a zero of the plant, where any error is large, does not decide.
     pub(super) relative_error: f64,
 }
 
@@ -116,11 +117,15 @@ pub(super) fn bounds(runs: &[Response], truth: &[DMatrix<Complex64>], at: &[usiz
             mean(&predicted) * (values.len() - 1) as f64 / scatter
         })
         .collect();
-    let errors = runs.iter().flat_map(|run| {
-        entries
-            .iter()
-            .map(|&(w, e)| (run.value[w][e] - truth[w][e]).norm() / truth[w][e].norm())
-    });
+    let errors: Vec<f64> = entries
+        .iter()
+        .map(|&(w, e)| {
+            let of_runs = runs
+                .iter()
+                .map(|run| (run.value[w][e] - truth[w][e]).norm());
+            (root_mean_square(of_runs) / truth[w][e].norm()).ln()
+        })
+        .collect();
     Bounds {
         linear,
         logarithmic,
@@ -128,7 +133,7 @@ pub(super) fn bounds(runs: &[Response], truth: &[DMatrix<Complex64>], at: &[usiz
         others_in_first: others[0],
         others: mean(&others),
         variance_ratio: mean(&ratios),
-        relative_error: root_mean_square(errors),
+        relative_error: mean(&errors).exp(),
     }
 }
 
