@@ -20,6 +20,7 @@
 //! Conventions: `x[k+1] = A x[k] + B u[k] + K e[k]`, `y[k] = C x[k] + D u[k] + e[k]`; `r` inputs, `l` outputs,
 //! `n` states, `z = [u; y]`, `q = r + l`; past window `p`, future window `f <= p`, `Nc = N - p` windows.
 
+pub mod baselines;
 mod candidate;
 mod data;
 mod delay;
@@ -33,6 +34,7 @@ mod model;
 mod options;
 mod order;
 mod pbsid_opt;
+pub mod pem;
 mod polish;
 mod records;
 mod scaling;
