@@ -25,7 +25,8 @@ struct Situation {
 }
 
 fn situations() -> Vec<Situation> {
-    let closed = |samples: usize| move |seed: u64| systems::van_wingerden_one().record(samples, seed);
+    let closed =
+        |samples: usize| move |seed: u64| systems::van_wingerden_one().record(samples, seed);
     let siso = systems::chiuso_picci_one;
     let slow = systems::chiuso_picci_two;
     let armax = systems::knudsen_armax;
@@ -104,7 +105,10 @@ fn run(situation: &Situation, options: &Options, seed: u64) -> Option<Run> {
     let mut squares = [Vec::new(), Vec::new()];
     for share in FREQUENCIES {
         let w = share * situation.truth.nyquist();
-        for (path, squares) in [Path::Input, Path::Innovation].into_iter().zip(&mut squares) {
+        for (path, squares) in [Path::Input, Path::Innovation]
+            .into_iter()
+            .zip(&mut squares)
+        {
             let truth = path.response(&situation.truth, w);
             let found = path.response(&model.system, w);
             for (t, f) in truth.iter().zip(found.iter()) {
@@ -117,7 +121,8 @@ fn run(situation: &Situation, options: &Options, seed: u64) -> Option<Run> {
         for (index, t) in truth.iter().enumerate() {
             let error = t - found[index];
             let [[a, b], [_, d]] = spread[index];
-            let square = d * error.re * error.re - 2.0 * b * error.re * error.im + a * error.im * error.im;
+            let square =
+                d * error.re * error.re - 2.0 * b * error.re * error.im + a * error.im * error.im;
             inside += usize::from(square <= ellipse_quantile(0.95, freedom) * (a * d - b * b));
         }
     }
@@ -156,7 +161,11 @@ fn main() {
         Method::PbsidOpt,
         Polish::Always,
     ));
-    choices.push(("innovant's default".to_owned(), Method::PbsidOpt, Polish::Auto));
+    choices.push((
+        "innovant's default".to_owned(),
+        Method::PbsidOpt,
+        Polish::Auto,
+    ));
     for situation in situations() {
         println!("\n### {}\n", situation.name);
         println!("| method | median error of G | of H | 95 % region holds G | failed | ms a run |");

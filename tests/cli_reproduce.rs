@@ -71,7 +71,11 @@ fn mistakes_are_told_before_any_work() {
     let folder = Folder::new();
     let unknown = folder.run(&["reproduce", "knudsen"]);
     assert_eq!(unknown.code, 2);
-    assert!(unknown.stderr.contains("knudsen-armax"), "{}", unknown.stderr);
+    assert!(
+        unknown.stderr.contains("knudsen-armax"),
+        "{}",
+        unknown.stderr
+    );
     let few = folder.run(&["reproduce", "chiuso-picci-1", "--runs", "2"]);
     assert_eq!(few.code, 2);
     assert!(few.stderr.contains("at least 8"), "{}", few.stderr);
@@ -88,7 +92,12 @@ fn mistakes_are_told_before_any_work() {
     assert!(place.stderr.contains("--output-dir"), "{}", place.stderr);
     let list = folder.run(&["reproduce"]);
     assert_eq!(list.code, 0);
-    for name in ["van-wingerden-1", "van-wingerden-2", "chiuso-picci-2", "knudsen-bj"] {
+    for name in [
+        "van-wingerden-1",
+        "van-wingerden-2",
+        "chiuso-picci-2",
+        "knudsen-bj",
+    ] {
         assert!(list.stdout.contains(name), "{name}");
     }
 }

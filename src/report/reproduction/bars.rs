@@ -6,9 +6,9 @@ use crate::report::drawing::number::{exact, number};
 use crate::reproduce::Bars;
 
 /// Width of a bar.
-const BAR: f64 = 11.0;
+const BAR: f64 = 9.0;
 /// Space between groups.
-const GAP: f64 = 22.0;
+const GAP: f64 = 18.0;
 /// Height of the area of the bars.
 const HEIGHT: f64 = 230.0;
 /// Room above it, for the values of bars that are cut.
@@ -18,7 +18,7 @@ const BOTTOM: f64 = 26.0;
 /// Room on the left, for the scale.
 const LEFT: f64 = 34.0;
 /// Colours of bars that the style sheet knows.
-const COLOURS: usize = 8;
+const COLOURS: usize = 9;
 
 /// A chart as the template draws it.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,7 +1,7 @@
 //! Errors of the parameters over many recordings.
 
 use super::SAMPLES;
-use super::methods::{Kind, Method, REFERENCE, methods};
+use super::methods::{Kind, Method, REFERENCE, bound, methods};
 use crate::reproduce::data::Failure;
 use crate::reproduce::error::ReproduceError;
 use crate::reproduce::figure::{BarSeries, Bars, Row, Table, all_finite};
@@ -31,6 +31,8 @@ pub(super) struct Outcome {
 pub(super) struct Errors {
     pub(super) example: KnudsenExample,
     pub(super) outcomes: Vec<Outcome>,
+    /// Square root of the Cramer-Rao bound, averaged over the recordings.
+    pub(super) bound: Vec<f64>,
     /// Index of [`REFERENCE`].
     reference: usize,
 }
@@ -46,11 +48,14 @@ impl Errors {
         let truth = example.parameters();
         let mut by_method: Vec<Vec<Result<Vec<f64>, Failure>>> =
             methods.iter().map(|_| Vec::with_capacity(runs)).collect();
-        let run = |seed: u64| -> Vec<Result<Vec<f64>, Failure>> {
+        let run = |seed: u64| {
             let log = example.record(SAMPLES, seed);
-            methods.iter().map(|m| (m.run)(&log, &example)).collect()
+            let found: Vec<_> = methods.iter().map(|m| (m.run)(&log, &example)).collect();
+            (found, bound(&log, &example))
         };
-        for results in study.monte_carlo(runs, run) {
+        let mut bounds = Vec::with_capacity(runs);
+        for (results, bound) in study.monte_carlo(runs, run) {
+            bounds.push(bound);
             for (all, result) in by_method.iter_mut().zip(results) {
                 all.push(result);
             }
@@ -67,9 +72,14 @@ impl Errors {
             .iter()
             .position(|o| o.method.name == REFERENCE)
             .unwrap_or(0);
+        let (bounds, _) = successes("the Cramer-Rao bound", bounds)?;
+        let bound = (0..truth.len())
+            .map(|k| mean(&bounds.iter().map(|b| b[k]).collect::<Vec<_>>()).sqrt())
+            .collect();
         Ok(Self {
             example,
             outcomes,
+            bound,
             reference,
         })
     }
@@ -168,7 +178,7 @@ impl Errors {
         let all = Table {
             id: "rms".to_owned(),
             title: "Root mean square errors".to_owned(),
-            caption: String::new(),
+            caption: "The bound is that of unbiased estimates at the truth; a biased one may stay below it.".to_owned(),
             rows_are: "Method".to_owned(),
             columns: columns.clone(),
             rows: std::iter::once(Row::printed("tk-chol as printed", printed.iter().copied()))
