@@ -12,7 +12,8 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `parameters` | [`ParameterCovariance`] and the order of the parameters |
-//! | `subspace`, `jackknife` | where the covariance comes from: the model, or blocks of the data |
+//! | `subspace`, `nested`, `jackknife` | where the covariance comes from: the model (PBSID_opt; whitening filter and innovation estimation), or blocks of the data |
+//! | `asymptotic` | the same for a known plant, noise and controller, for studies |
 //! | `gradient` | the one form that all gradients have |
 //! | `frequency_response`, `poles`, `zeros`, `response` | uncertainty of each invariant |
 //! | `quantile` | from standard deviations to intervals, from covariances to ellipses |
@@ -21,6 +22,7 @@
 //! | `document`, `invariants` | all of it for a JSON document |
 //! | `error` | [`CovarianceError`] |
 
+mod asymptotic;
 mod bands;
 mod document;
 mod draws;
@@ -31,6 +33,7 @@ mod frequency_response;
 mod gradient;
 mod invariants;
 mod jackknife;
+mod nested;
 mod parameters;
 mod poles;
 mod quantile;
@@ -38,6 +41,7 @@ mod response;
 mod subspace;
 mod zeros;
 
+pub use asymptotic::{AsymptoticMethod, asymptotic_covariance};
 pub use bands::{
     BandMethod, DRAWS, LARGEST_RELATIVE_STD, ResponseBand, SMALLEST_POLE_DISTANCE, response_bands,
 };
@@ -49,6 +53,8 @@ pub use gradient::Covariance2;
 pub(crate) use gradient::projected_variance;
 pub use invariants::invariants;
 pub use jackknife::jackknife_covariance;
+pub use nested::NestedErrors;
+pub(crate) use nested::newest_first;
 pub use parameters::{ParameterCovariance, ParameterLayout};
 pub use poles::{PoleUncertainty, pole_uncertainties};
 pub use quantile::{ellipse_quantile, interval_quantile};

@@ -25,6 +25,21 @@ pub enum IdentifyError {
         /// Samples needed.
         needed: usize,
     },
+    /// Not enough samples for the past and the future window together.
+    #[error(
+        "the recording is too short: {samples} samples, but a past window of {past} and a future window of {future} \
+         need at least {needed}; give a longer recording, or a smaller --past or --future"
+    )]
+    TooShortForWindows {
+        /// Samples there are.
+        samples: usize,
+        /// Past window.
+        past: usize,
+        /// Future window.
+        future: usize,
+        /// Samples needed.
+        needed: usize,
+    },
     /// Not enough samples for any model.
     #[error(
         "the recording is too short: {samples} samples in all, and a model of {channels} channels needs at \

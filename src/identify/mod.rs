@@ -10,6 +10,7 @@
 //! | `method` | which algorithm: one enum variant and one module each | |
 //! | `pbsid_opt` | states by a weighted singular value decomposition, system matrices by least squares | van Wingerden (24)-(34) |
 //! | `stochastic` | `K` and `Lambda` by a step of its own, for any deterministic part | |
+//! | `nested` | states from nested regressions, growing past | Chiuso & Picci; Qin & Ljung |
 //! | `order`, `select` | which order: singular values propose, a chi-square test referees | Bauer 2001 |
 //! | `truncation` | what the past window cuts off | |
 //! | `polish` | the maximum-likelihood model of that order | Soderstrom, Stoica & Friedlander 1991 |
@@ -31,6 +32,7 @@ mod horizon;
 pub mod knudsen;
 pub mod method;
 mod model;
+mod nested;
 mod options;
 mod order;
 mod pbsid_opt;
@@ -53,6 +55,9 @@ pub use error::IdentifyError;
 pub use fit::{Fit, fit};
 pub use method::{Method, Propagation};
 pub use model::{IdentifiedChannel, Model, identify, identify_records};
+pub use nested::{
+    Nested, NestedDecomposition, Prediction, decompose_nested, nested_system_matrices,
+};
 pub use options::{CovarianceKind, Options, Order, Polish};
 pub use order::OrderEvidence;
 pub use pbsid_opt::{Decomposition, Estimate, Weight, decompose, system_matrices};

@@ -126,17 +126,32 @@ impl Decomposition {
     /// The map `S` (`n x f l`) from the stacked predicted outputs to the state, (29), scaled so that the
     /// states have unit variance.
     pub fn state_map(&self, order: usize) -> DMatrix<f64> {
-        let mut map = self.weighted_left.rows(0, order).into_owned();
-        for (i, mut row) in map.row_iter_mut().enumerate() {
-            row *= (self.columns as f64).sqrt() / self.singular_values[i];
-        }
-        map
+        scaled_rows(
+            &self.weighted_left,
+            &self.singular_values,
+            self.columns,
+            order,
+        )
     }
 
     /// `S [Gamma K]`, `n x p q`: the state as a function of the past window.
     fn state_of_past(&self, state_map: &DMatrix<f64>) -> DMatrix<f64> {
         multiply(state_map, &self.gamma_k)
     }
+}
+
+/// The first `order` rows of `U' W`, each divided by the standard deviation of its state over the record.
+pub(super) fn scaled_rows(
+    weighted_left: &DMatrix<f64>,
+    singular_values: &[f64],
+    columns: usize,
+    order: usize,
+) -> DMatrix<f64> {
+    let mut map = weighted_left.rows(0, order).into_owned();
+    for (i, mut row) in map.row_iter_mut().enumerate() {
+        row *= (columns as f64).sqrt() / singular_values[i];
+    }
+    map
 }
 
 /// System matrices with the regression quantities that their covariance needs.
@@ -164,14 +179,36 @@ pub fn system_matrices(
     state_map: DMatrix<f64>,
     sample_time: f64,
 ) -> Result<Estimate, IdentifyError> {
+    let q = factor.channels();
+    let n = state_map.nrows();
+    let width = factor.past * q;
+    let state = decomposition.state_of_past(&state_map);
+    // The past window slides by one sample.
+    let mut next = DMatrix::zeros(n, width + q);
+    next.view_mut((0, q), (n, width)).copy_from(&state);
+    state_regressions(factor, varx, &state, &next, state_map, sample_time)
+}
+
+/// `[A B K]` and `[C (D)]` by regression, for a state that is `state` (`n x p q`) times the past window and a next
+/// state that is `next` (`n x (p+1) q`) times the past window with its next sample.
+///
+/// # Errors
+/// [`IdentifyError::SingularRegression`] when the regressors are dependent.
+pub(super) fn state_regressions(
+    factor: &RFactor,
+    varx: &Varx,
+    state: &DMatrix<f64>,
+    next: &DMatrix<f64>,
+    state_map: DMatrix<f64>,
+    sample_time: f64,
+) -> Result<Estimate, IdentifyError> {
     let (q, inputs, outputs) = (factor.channels(), factor.inputs, factor.outputs);
     let n = state_map.nrows();
     let width = factor.past * q;
     let total = width + q;
-    let state = decomposition.state_of_past(&state_map);
 
     let mut phi = DMatrix::zeros(n + inputs + outputs, total);
-    phi.view_mut((0, 0), (n, width)).copy_from(&state);
+    phi.view_mut((0, 0), (n, width)).copy_from(state);
     for i in 0..inputs {
         phi[(n + i, width + i)] = 1.0;
     }
@@ -181,10 +218,8 @@ pub fn system_matrices(
     for i in 0..outputs {
         phi[(n + inputs + i, width + inputs + i)] = 1.0;
     }
-    let mut next = DMatrix::zeros(n, total);
-    next.view_mut((0, q), (n, width)).copy_from(&state);
 
-    let next_state = multiply_nt(&factor.r, &next);
+    let next_state = multiply_nt(&factor.r, next);
     let state_inverse = left_inverse(
         &multiply_nt(&factor.r, &phi),
         n + inputs,
