@@ -81,7 +81,10 @@ pub fn finish(
                 })
         }
     };
-    let polished = candidate.polished.filter(|_| use_polish);
+    let polished_by_method = use_polish && options.method.polishes_itself();
+    let polished = candidate
+        .polished
+        .filter(|_| use_polish && !polished_by_method);
     let order_test = polished.as_ref().map(|p| OrderTest {
         chi_square: p.cost,
         degrees_of_freedom: p.degrees_of_freedom,
@@ -160,7 +163,7 @@ pub fn finish(
         method: options.method,
         stochastic: options.stochastic,
         weight,
-        polished: polished.is_some(),
+        polished: polished.is_some() || polished_by_method,
         order,
         horizons: Horizons {
             past: factor.past,
@@ -202,7 +205,7 @@ pub fn finish(
         warnings: Vec::new(),
     };
     summary.warnings = warnings::of_fit(&summary, &varx, noise_free, options);
-    if polished.as_ref().is_some_and(|p| !p.converged) {
+    if polished.as_ref().is_some_and(|p| !p.converged) || !estimate.converged() {
         summary.warnings.push(warnings::not_converged());
     }
     if predictor_mirrored && !noise_free {

@@ -59,6 +59,9 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
         .max(1);
     let longest = options.past.unwrap_or(longest);
     let lags = options.method.lags(longest, options.future);
+    let lags = options
+        .stochastic
+        .map_or(lags, |step| lags.max(step.lags(longest, options.future)));
     let data = Data::read(records, options, lags)?;
     let longest = longest.min(data.lags());
 
@@ -217,6 +220,9 @@ fn choose_past(
                 options.future.unwrap_or(1)
             });
     let limit = limit.max(smallest).min(longest);
+    let preferred = options
+        .method
+        .smallest_past(outputs, options.order.largest());
     if smallest > limit || smallest * (q + 1) + outputs >= data.samples {
         let order = options.order.largest();
         // The past window that the recording allows, with more windows than regressors.
@@ -248,9 +254,14 @@ fn choose_past(
     // Akaike's choice balances bias against variance of the predictions; the states need the tail of the
     // predictor a little more, and the polish takes the extra variance out again.
     let past = if noise_free { best } else { best + 2 };
-    let past = past.max(smallest).min(limit);
+    let past = past.max(smallest).max(preferred).min(limit);
     explanation.push(format!(
-        "past window {past}: Akaike's criterion of the vector ARX model is smallest at {best} (of 1..{limit})"
+        "past window {past}: Akaike's criterion of the vector ARX model is smallest at {best} (of 1..{limit}){}",
+        if past == preferred && best + 2 < preferred {
+            format!("; {} wants at least {preferred}", options.method.name())
+        } else {
+            String::new()
+        }
     ));
     let evidence = criterion
         .into_iter()

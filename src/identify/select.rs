@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::candidate::{Candidate, Window, cost_p_value};
 use super::error::IdentifyError;
 use super::horizon;
-use super::method::{Decomposed, Windows};
+use super::method::{Decomposed, Method, Windows};
 use super::options::{Options, Order};
 use super::order::{self, OrderEvidence};
 use super::pbsid_opt::{Weight, decompose};
@@ -113,12 +113,16 @@ fn select_by(
                 varx: Arc::clone(varx),
                 future: future_for_choice,
                 weight,
+                stochastic: options.stochastic,
+                comparing: true,
+                polish_by_method: false,
                 sample_time: source.sample_time(),
             },
             polish: !noise_free,
             effort: Effort::Referee,
         },
         options,
+        method: options.method.for_comparing_orders(),
         source,
         decompositions: Vec::new(),
         candidates: Vec::new(),
@@ -139,7 +143,7 @@ fn select_by(
         }
         Order::Auto => choose_order(&mut evidence, varx, &mut estimator),
     };
-    estimator.for_good(polish);
+    estimator.for_good(polish, proposal_only);
     let candidate = estimator.candidate(order)?.clone();
     if polish {
         note(&mut evidence, &candidate, varx);
@@ -160,25 +164,35 @@ fn select_by(
 struct Estimator<'a, 'b> {
     window: Window,
     options: &'a Options,
+    method: Method,
     source: &'a mut Source<'b>,
     decompositions: Vec<(usize, Arc<dyn Decomposed>)>,
     candidates: Vec<Candidate>,
 }
 
 impl Estimator<'_, '_> {
-    /// From here on candidates are final: what the referee was content with is estimated again.
-    fn for_good(&mut self, polish: bool) {
+    /// From here on candidates are final: what the referee was content with is estimated again. A proposal is not
+    /// final, and a method that makes its own improvements waits with them.
+    fn for_good(&mut self, polish: bool, proposal_only: bool) {
+        let own_numbers = self.options.method.polishes_itself();
         let converged = |c: &Candidate| c.polished.as_ref().is_some_and(|p| p.converged);
-        self.candidates.retain(|c| polish && converged(c));
-        self.window.polish = polish;
+        self.candidates
+            .retain(|c| polish && !own_numbers && converged(c));
+        self.window.polish = polish && !own_numbers;
         self.window.effort = Effort::Full;
+        if own_numbers && !proposal_only {
+            self.method = self.options.method;
+            self.window.windows.comparing = false;
+            self.window.windows.polish_by_method = polish;
+            self.decompositions.clear();
+        }
     }
 
     fn future_for(&self, order: usize) -> usize {
         let factor = &self.window.windows.factor;
         self.options
             .future
-            .unwrap_or_else(|| horizon::future_for_order(factor.past, factor.outputs, order))
+            .unwrap_or_else(|| self.method.future(factor.past, factor.outputs, order))
     }
 
     fn decomposition(&mut self, future: usize) -> Result<Arc<dyn Decomposed>, IdentifyError> {
@@ -189,10 +203,10 @@ impl Estimator<'_, '_> {
             future,
             ..self.window.windows.clone()
         };
-        let own = self.options.method.decompose(&windows, self.source)?;
+        let own = self.method.decompose(&windows, self.source)?;
         let made = match self.options.stochastic {
-            Some(step) => step.instead_of_own(own, windows),
-            None => own,
+            Some(step) if !self.method.has_own(step) => step.instead_of_own(own, windows),
+            _ => own,
         };
         self.decompositions.push((future, Arc::clone(&made)));
         Ok(made)

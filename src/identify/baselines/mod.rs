@@ -3,6 +3,7 @@
 //! | file | method | source |
 //! |---|---|---|
 //! | `subid` | robust combined algorithm | van Overschee & De Moor (1996), figure 4.8 |
+//! | `table_two` | all methods of the table on one recording | Knudsen (2001), section 6 |
 //! | `n4sid` | shift of the observability matrix, inputs by simulation, noise by a Riccati equation | Ljung (1999), section 10.6 |
 //!
 //! Both need inputs that do not depend on past outputs. `n4sid` follows the book; it is not the MATLAB function, and
@@ -10,6 +11,7 @@
 
 mod n4sid;
 mod subid;
+mod table_two;
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -17,12 +19,14 @@ use serde::{Deserialize, Serialize};
 use super::error::IdentifyError;
 use super::knudsen::Regression;
 use crate::linalg::{
-    LinalgError, cholesky_upper, multiply, multiply_tn, qr_thin, stationary_filter, svd_thin,
+    LinalgError, multiply, multiply_tn, qr_r, qr_thin, solve_upper_transposed, stationary_filter,
+    svd_thin,
 };
 use crate::model::StateSpace;
 
 pub use n4sid::n4sid;
 pub use subid::subid;
+pub use table_two::TableTwo;
 
 /// Weights of the singular value decomposition of the oblique projection.
 #[derive(
@@ -85,15 +89,18 @@ fn weighted_observability(
             let rest = factor
                 .view((regressors, regressors), (outputs, outputs))
                 .into_owned();
-            let explained = perpendicular(&explained);
-            let covariance = multiply_tn(&explained, &explained) + multiply_tn(&rest, &rest);
+            let mut stacked = DMatrix::zeros(regressors + outputs, outputs);
+            stacked
+                .rows_mut(0, regressors)
+                .copy_from(&perpendicular(&explained));
+            stacked.rows_mut(regressors, outputs).copy_from(&rest);
             // Y_f Pi Y_f' = C' C: W1 = C'^-1, and W1^-1 = C'.
-            cholesky_upper(&covariance)?.transpose()
+            qr_r(&stacked).transpose()
         }
     };
     let weighted = match weight {
         ProjectionWeight::Moesp => product,
-        ProjectionWeight::Cva => crate::linalg::solve_upper_transposed(&root.transpose(), &product),
+        ProjectionWeight::Cva => solve_upper_transposed(&root.transpose(), &product),
     };
     let svd = svd_thin(&weighted)?;
     let mut left = svd.u.columns(0, order).into_owned();

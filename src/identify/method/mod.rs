@@ -7,10 +7,16 @@
 //! | file | method | source |
 //! |---|---|---|
 //! | `pbsid_opt` | [`Method::PbsidOpt`] | van Wingerden |
+//! | `knudsen` | [`Method::Knudsen`] | Knudsen |
+//! | `pem` | [`Method::Pem`] | Ljung |
+//! | `subid` | [`Method::Subid`] | van Overschee & De Moor |
 //! | `closed_loop` | [`Method::Whitening`], [`Method::InnovationEstimation`] | Chiuso & Picci |
 
 mod closed_loop;
+mod knudsen;
 mod pbsid_opt;
+mod pem;
+mod subid;
 
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -19,9 +25,11 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::error::IdentifyError;
+use super::horizon;
 use super::nested::Prediction;
 use super::pbsid_opt::Weight;
 use super::source::Source;
+use super::stochastic::Stochastic;
 use super::varx::Varx;
 use crate::covariance::ParameterCovariance;
 use crate::model::StateSpace;
@@ -50,6 +58,12 @@ pub enum Method {
     Whitening,
     /// Innovation estimation (Qin & Ljung): least disturbed by a past window that is short for the noise dynamics
     InnovationEstimation,
+    /// Knudsen's tk-chol (with --stochastic first-column tk); open loop only
+    Knudsen,
+    /// Prediction error method: maximum likelihood in the time domain, started from tk-chol or PBSID_opt
+    Pem,
+    /// Robust combined subspace algorithm of van Overschee and De Moor; open loop only
+    Subid,
 }
 
 impl Method {
@@ -64,6 +78,9 @@ impl Method {
             Self::PbsidOpt => "pbsid-opt",
             Self::Whitening => "whitening",
             Self::InnovationEstimation => "innovation-estimation",
+            Self::Knudsen => "knudsen",
+            Self::Pem => "pem",
+            Self::Subid => "subid",
         }
     }
 
@@ -73,21 +90,73 @@ impl Method {
         match self {
             Self::PbsidOpt => past,
             Self::Whitening | Self::InnovationEstimation => past + future.unwrap_or(past),
+            // An order that fits the past window of l outputs has a future of at most past + 2.
+            Self::Knudsen | Self::Pem | Self::Subid => past + future.unwrap_or(past + 2),
         }
     }
 
     /// Whether the future window may be longer than the past window.
     pub fn allows_longer_future(self) -> bool {
         match self {
-            Self::PbsidOpt => false,
-            Self::Whitening | Self::InnovationEstimation => true,
+            Self::PbsidOpt | Self::Pem | Self::Subid => false,
+            Self::Whitening | Self::InnovationEstimation | Self::Knudsen => true,
         }
+    }
+
+    /// Future window for an order when none is asked for.
+    pub fn future(self, past: usize, outputs: usize, order: usize) -> usize {
+        match self {
+            Self::PbsidOpt | Self::Whitening | Self::InnovationEstimation | Self::Pem => {
+                horizon::future_for_order(past, outputs, order)
+            }
+            // Longer ones add noise to the Toeplitz matrices faster than they add information.
+            Self::Knudsen => order.div_ceil(outputs) + 2,
+            // The algorithm needs both windows equal.
+            Self::Subid => past,
+        }
+    }
+
+    /// Smallest past window that is chosen automatically, for the largest order that is asked for.
+    pub fn smallest_past(self, outputs: usize, order: usize) -> usize {
+        match self {
+            Self::PbsidOpt | Self::Whitening | Self::InnovationEstimation | Self::Pem => 1,
+            Self::Knudsen => knudsen::SMALLEST_PAST,
+            // n states are seen over n / l samples, and the future window is shifted by one.
+            Self::Subid => order.div_ceil(outputs) + 2,
+        }
+    }
+
+    /// The method that stands in while orders are compared: the prediction error method runs once, in the end.
+    pub fn for_comparing_orders(self) -> Self {
+        match self {
+            Self::Pem => Self::PbsidOpt,
+            other => other,
+        }
+    }
+
+    /// Whether the method does `--polish always` itself: its numbers are then those of its own improvement.
+    pub fn polishes_itself(self) -> bool {
+        match self {
+            // One Gauss-Newton step in the time domain; the other is maximum likelihood as it is.
+            Self::Knudsen | Self::Pem => true,
+            Self::PbsidOpt | Self::Whitening | Self::InnovationEstimation | Self::Subid => false,
+        }
+    }
+
+    /// Whether the method does this stochastic step itself, with its covariance.
+    pub fn has_own(self, step: Stochastic) -> bool {
+        self == Self::Knudsen && matches!(step, Stochastic::FirstColumn | Stochastic::Cholesky)
     }
 
     /// Whether [`Estimated::covariance`] has a formula.
     pub fn has_covariance(self) -> bool {
         match self {
-            Self::PbsidOpt | Self::Whitening | Self::InnovationEstimation => true,
+            Self::PbsidOpt
+            | Self::Whitening
+            | Self::InnovationEstimation
+            | Self::Knudsen
+            | Self::Pem => true,
+            Self::Subid => false,
         }
     }
 
@@ -108,6 +177,8 @@ impl Method {
         match self {
             Self::PbsidOpt | Self::Whitening => automatic,
             Self::InnovationEstimation => Weight::Cva,
+            // Their one weight is part of them; subid's own is called SV.
+            Self::Knudsen | Self::Pem | Self::Subid => Weight::Identity,
         }
     }
 
@@ -126,6 +197,9 @@ impl Method {
             Self::InnovationEstimation => {
                 closed_loop::decomposed(Prediction::InnovationEstimation, windows, source)
             }
+            Self::Knudsen => knudsen::decomposed(windows, source),
+            Self::Pem => pem::decomposed(windows, source),
+            Self::Subid => subid::decomposed(windows, source),
         }
     }
 }
@@ -141,6 +215,12 @@ pub struct Windows {
     pub future: usize,
     /// Weight of the singular value decomposition.
     pub weight: Weight,
+    /// The stochastic step that was asked for, for a method that does it itself ([`Method::has_own`]).
+    pub stochastic: Option<Stochastic>,
+    /// Whether orders are still being compared: what only the final model needs can wait.
+    pub comparing: bool,
+    /// Whether a method that polishes its estimate itself ([`Method::polishes_itself`]) is to do so.
+    pub polish_by_method: bool,
     /// Sample time in seconds.
     pub sample_time: f64,
 }
@@ -198,6 +278,11 @@ pub trait Estimated: Debug + Send + Sync {
     /// # Errors
     /// [`IdentifyError`] when those data do not allow it.
     fn replicate(&self, factor: &RFactor) -> Result<StateSpace, IdentifyError>;
+
+    /// Whether the estimate is what the method aims at; a search may run out of steps.
+    fn converged(&self) -> bool {
+        true
+    }
 }
 
 /// First-order errors as a linear function of white noise `w` of unit covariance.

@@ -6,10 +6,12 @@
 //! | file | step | source |
 //! |---|---|---|
 //! | `innovations` | [`Stochastic::Innovations`] | least squares in the vector ARX coefficients |
+//! | `residual` | [`Stochastic::FirstColumn`], [`Stochastic::Cholesky`] | Knudsen (35)-(40) |
 //! | `combined` | a method's deterministic part with another stochastic step | |
 
 mod combined;
 mod innovations;
+mod residual;
 
 use std::sync::Arc;
 
@@ -17,6 +19,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::error::IdentifyError;
+use super::knudsen::ResidualStep;
 use super::method::{Decomposed, Propagation, Windows};
 use crate::model::StateSpace;
 use crate::moments::RFactor;
@@ -30,6 +33,10 @@ pub enum Stochastic {
     /// The gain whose one-step predictor is nearest to the vector ARX model, given A, B, C, D: maximum
     /// likelihood for K alone, also in closed loop
     Innovations,
+    /// Knudsen's tk: the first block column of the covariance of stacked residuals; open loop only
+    FirstColumn,
+    /// Knudsen's tk-chol: its Cholesky factor, which takes most of the bias of tk away; open loop only
+    Cholesky,
 }
 
 /// What a stochastic step delivers, in the scaled units and the state basis of the deterministic part.
@@ -51,6 +58,8 @@ impl Stochastic {
     pub fn name(self) -> &'static str {
         match self {
             Self::Innovations => "innovations",
+            Self::FirstColumn => "first-column",
+            Self::Cholesky => "cholesky",
         }
     }
 
@@ -58,6 +67,16 @@ impl Stochastic {
     pub fn has_covariance(self) -> bool {
         match self {
             Self::Innovations => true,
+            Self::FirstColumn | Self::Cholesky => false,
+        }
+    }
+
+    /// Lags that the moments must hold for these windows; `future` is `None` when it is chosen later, and is at
+    /// most `past` then.
+    pub fn lags(self, past: usize, future: Option<usize>) -> usize {
+        match self {
+            Self::Innovations => past,
+            Self::FirstColumn | Self::Cholesky => past + future.unwrap_or(past),
         }
     }
 
@@ -65,6 +84,7 @@ impl Stochastic {
     pub fn window(self, windows: &Windows) -> usize {
         match self {
             Self::Innovations => windows.factor.past,
+            Self::FirstColumn | Self::Cholesky => windows.factor.past + windows.future - 1,
         }
     }
 
@@ -81,6 +101,12 @@ impl Stochastic {
     ) -> Result<StochasticPart, IdentifyError> {
         match self {
             Self::Innovations => innovations::estimate(deterministic, windows, factor),
+            Self::FirstColumn => {
+                residual::estimate(deterministic, windows, factor, ResidualStep::FirstColumn)
+            }
+            Self::Cholesky => {
+                residual::estimate(deterministic, windows, factor, ResidualStep::Cholesky)
+            }
         }
     }
 
@@ -100,6 +126,7 @@ impl Stochastic {
             Self::Innovations => {
                 innovations::propagation(system, &windows.varx, of_method).map(Some)
             }
+            Self::FirstColumn | Self::Cholesky => Ok(None),
         }
     }
 

@@ -2,9 +2,13 @@
 
 use num_complex::Complex64;
 
-use crate::covariance::frequency_response_covariance;
-use crate::identify::{Options, Order, Polish, Weight, identify};
+use crate::covariance::{
+    AsymptoticMethod, CovarianceError, ParameterCovariance, asymptotic_covariance,
+    frequency_response_covariance,
+};
+use crate::identify::{Method, Options, Order, Polish, Prediction, Weight, identify};
 use crate::log::Log;
+use crate::model::StateSpace;
 use crate::moments::Detrend;
 pub(super) use crate::reproduce::data::Failure;
 use crate::reproduce::error::ReproduceError;
@@ -26,16 +30,50 @@ pub(super) struct Algorithm {
     pub(super) name: &'static str,
     /// Whether the paper's figure has it.
     pub(super) in_paper: bool,
-    pub(super) weight: Weight,
+    method: Method,
+    asymptotic: AsymptoticMethod,
+    weight: Weight,
 }
 
-/// The algorithms.
+/// The whitening filter, by the name that it has here.
+pub(super) const WHITENING: &str = "whitening filter";
+/// PBSID_opt, likewise.
+pub(super) const OPTIMISED: &str = "PBSID_opt";
+
+/// The algorithms: the paper's two, and what is added.
 pub(super) fn algorithms() -> Vec<Algorithm> {
-    vec![Algorithm {
-        name: "PBSID_opt",
-        in_paper: false,
-        weight: Weight::Identity,
-    }]
+    let whitening = AsymptoticMethod::Nested(Prediction::Whitening);
+    let innovation = AsymptoticMethod::Nested(Prediction::InnovationEstimation);
+    vec![
+        Algorithm {
+            name: WHITENING,
+            in_paper: true,
+            method: Method::Whitening,
+            asymptotic: whitening,
+            weight: Weight::Identity,
+        },
+        Algorithm {
+            name: "innovation estimation",
+            in_paper: true,
+            method: Method::InnovationEstimation,
+            asymptotic: innovation,
+            weight: Weight::Identity,
+        },
+        Algorithm {
+            name: "innovation estimation, CVA",
+            in_paper: false,
+            method: Method::InnovationEstimation,
+            asymptotic: innovation,
+            weight: Weight::Cva,
+        },
+        Algorithm {
+            name: OPTIMISED,
+            in_paper: false,
+            method: Method::PbsidOpt,
+            asymptotic: AsymptoticMethod::PbsidOpt,
+            weight: Weight::Identity,
+        },
+    ]
 }
 
 /// What one run finds: response and its estimated variance at the frequencies of the grid.
@@ -45,9 +83,25 @@ pub(super) struct Found {
     pub(super) variance: Vec<f64>,
 }
 
+/// Variance of the response, `E|F - E F|^2`, at the frequencies of the grid.
+fn variances(
+    system: &StateSpace,
+    covariance: &ParameterCovariance,
+    grid: &[f64],
+) -> Result<Vec<f64>, CovarianceError> {
+    grid.iter()
+        .map(|&w| {
+            let spread = frequency_response_covariance(system, covariance, w)?;
+            let [[re, _], [_, im]] = spread[(0, 0)];
+            Ok(re + im)
+        })
+        .collect()
+}
+
 impl Algorithm {
     fn options(&self, windows: &Windows) -> Options {
         Options {
+            method: self.method,
             order: Order::Fixed(windows.order),
             past: Some(windows.past),
             future: Some(windows.future),
@@ -63,21 +117,12 @@ impl Algorithm {
         let model = identify(std::slice::from_ref(log), &self.options(windows))
             .map_err(|e| e.to_string())?;
         let covariance = model.covariance.ok_or("no covariance")?;
-        let variance = grid
-            .iter()
-            .map(|&w| {
-                let spread = frequency_response_covariance(&model.system, &covariance, w)?;
-                let [[re, _], [_, im]] = spread[(0, 0)];
-                Ok(re + im)
-            })
-            .collect::<Result<_, crate::covariance::CovarianceError>>()
-            .map_err(|e| e.to_string())?;
         Ok(Found {
             response: grid
                 .iter()
                 .map(|&w| model.system.frequency_response(w)[(0, 0)])
                 .collect(),
-            variance,
+            variance: variances(&model.system, &covariance, grid).map_err(|e| e.to_string())?,
         })
     }
 
@@ -88,16 +133,15 @@ impl Algorithm {
         windows: &Windows,
         grid: &[f64],
     ) -> Result<Vec<f64>, ReproduceError> {
-        let log = plant.record(1_000_000, 1)?;
-        let found = self
-            .run(&log, windows, grid)
-            .map_err(|first| ReproduceError::Failed {
-                method: self.name.to_owned(),
-                failed: 1,
-                runs: 1,
-                first,
-            })?;
-        let scale = (log.samples() - windows.past) as f64 / windows.columns as f64;
-        Ok(found.variance.iter().map(|v| v * scale).collect())
+        let covariance = asymptotic_covariance(
+            plant,
+            self.asymptotic,
+            self.weight,
+            windows.past,
+            windows.future,
+        )?;
+        let columns = windows.columns as f64;
+        let variances = variances(&plant.plant, &covariance, grid)?;
+        Ok(variances.into_iter().map(|v| v / columns).collect())
     }
 }

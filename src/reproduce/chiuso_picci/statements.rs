@@ -1,5 +1,6 @@
 //! What the paper says, held against the study.
 
+use super::algorithm::{OPTIMISED, WHITENING};
 use super::variance::{Outcome, Plan};
 use crate::reproduce::document::{Agreement, Comparison};
 use crate::reproduce::words::{number, range};
@@ -80,8 +81,8 @@ pub(super) fn statements(outcomes: &[Outcome]) -> Vec<Comparison> {
 
 /// The algorithms against each other, by their true asymptotic variance.
 pub(super) fn against_optimised(outcomes: &[Outcome]) -> Vec<Comparison> {
-    let find = |name: &str| outcomes.iter().find(|o| o.algorithm.name.starts_with(name));
-    let (Some(optimised), Some(whitening)) = (find("PBSID_opt"), find("whitening")) else {
+    let find = |name: &str| outcomes.iter().find(|o| o.algorithm.name == name);
+    let (Some(optimised), Some(whitening)) = (find(OPTIMISED), find(WHITENING)) else {
         return Vec::new();
     };
     let ratios: Vec<f64> = Plan::given()

@@ -1,11 +1,9 @@
 //! The methods of table 2 that run here, and what this crate adds to them: one recording in, ARMAX parameters out.
 
-use crate::identify::baselines::{BaselineEstimate, ProjectionWeight, n4sid, subid};
+use crate::identify::baselines::TableTwo;
 use crate::identify::knudsen::{Decomposition, Regression, ResidualStep, knudsen};
-use crate::identify::pem::{Form, STEPS, prediction_error_method};
-use crate::identify::varx;
+use crate::identify::pem::{Form, prediction_error_method};
 use crate::log::Log;
-use crate::model::StateSpace;
 use crate::reproduce::data::{Failure, raw_factor};
 use crate::systems::{KnudsenExample, armax_parameters};
 
@@ -33,187 +31,82 @@ pub(super) struct Method {
 
 /// The method that the paper's figures are relative to.
 pub(super) const REFERENCE: &str = "tk-chol";
-/// Past horizon of tk-chol with a longer past.
-pub(super) const LONG_PAST: usize = 20;
-
-/// The name of that method.
+/// tk-chol with a longer past.
 pub(super) const WITH_LONG_PAST: &str = "tk-chol, i = 20";
 /// The same with one Gauss-Newton step of the prediction error.
 pub(super) const WITH_STEP: &str = "tk-chol, i = 20, one step";
-/// Longest past that the automatic choice looks at: beyond it 500 samples have nothing more to say.
-const LONGEST_PAST: usize = 15;
+/// The n4sid-like method with fixed horizons that its automatic form is held against.
+pub(super) const FIXED_HORIZONS: &str = "n4sid-like CVA";
+/// Past horizon of [`WITH_LONG_PAST`].
+const LONG_PAST: usize = 20;
+
+/// A method of table 2 as a function of recording and system.
+macro_rules! of_table {
+    ($method:ident) => {
+        |log, example| table_two(TableTwo::$method, log, example)
+    };
+}
 
 /// All of them; [`REFERENCE`] is among them.
 pub(super) fn methods() -> Vec<Method> {
     use Kind::{Added, Automatic, PredictionError, Subspace};
-    use ProjectionWeight::{Cva, Moesp};
     let method = |name, kind, run| Method { name, kind, run };
     vec![
-        method(REFERENCE, Subspace, tk_chol),
-        method("tk", Subspace, |log, example| {
-            let horizon = example.horizon;
-            finished(&residual_step(
-                log,
-                example,
-                ResidualStep::FirstColumn,
-                horizon,
-                horizon,
-            )?)
-        }),
-        method("subid, SV", Subspace, |log, example| {
-            by_subid(log, example, Moesp)
-        }),
-        method("subid, CVA", Subspace, |log, example| {
-            by_subid(log, example, Cva)
-        }),
-        method("n4sid, MOESP", Subspace, |log, example| {
-            by_n4sid(log, example, Moesp, example.horizon, example.horizon)
-        }),
-        method("n4sid, CVA", Subspace, |log, example| {
-            by_n4sid(log, example, Cva, example.horizon, example.horizon)
-        }),
-        method("n4sid, automatic", Automatic, |log, example| {
-            let past = automatic_past(log)?.max(example.horizon);
-            by_n4sid(log, example, Cva, past, past)
-        }),
-        method("prediction error", PredictionError, |log, example| {
-            let horizon = example.horizon;
-            let start = residual_step(log, example, ResidualStep::Cholesky, horizon, horizon)?;
-            prediction_error(log, &start.0, STEPS)
-        }),
-        method(WITH_LONG_PAST, Added, |log, example| {
-            finished(&with_long_past(log, example)?)
-        }),
-        method(WITH_STEP, Added, |log, example| {
-            prediction_error(log, &with_long_past(log, example)?.0, 1)
-        }),
+        method(REFERENCE, Subspace, of_table!(TkChol)),
+        method("tk", Subspace, of_table!(Tk)),
+        method("subid SV", Subspace, of_table!(SubidSv)),
+        method("subid CVA", Subspace, of_table!(SubidCva)),
+        method("n4sid-like MOESP", Subspace, of_table!(N4sidMoesp)),
+        method(FIXED_HORIZONS, Subspace, of_table!(N4sidCva)),
+        method("n4sid-like, automatic", Automatic, of_table!(N4sidAuto)),
+        method("prediction error", PredictionError, of_table!(Pem)),
+        method(WITH_LONG_PAST, Added, with_long_past),
+        method(WITH_STEP, Added, of_table!(Polished)),
     ]
 }
 
-/// A model with its innovation variance.
-type Found = (StateSpace, f64);
-
-fn tk_chol(log: &Log, example: &KnudsenExample) -> Result<Vec<f64>, Failure> {
-    let horizon = example.horizon;
-    finished(&residual_step(
-        log,
-        example,
-        ResidualStep::Cholesky,
-        horizon,
-        horizon,
-    )?)
+fn table_two(method: TableTwo, log: &Log, example: &KnudsenExample) -> Result<Vec<f64>, Failure> {
+    method
+        .parameters(log, example.order(), example.horizon)
+        .map_err(|e| e.to_string())
 }
 
-fn with_long_past(log: &Log, example: &KnudsenExample) -> Result<Found, Failure> {
-    residual_step(
-        log,
-        example,
-        ResidualStep::Cholesky,
-        LONG_PAST,
-        example.order() + 2,
-    )
-}
-
-fn regression(log: &Log, past: usize, future: usize) -> Result<Regression, Failure> {
-    let factor = raw_factor(log, past + future - 1)?;
-    Regression::new(&factor, past).map_err(|e| e.to_string())
-}
-
-/// Knudsen's estimate with past `past` and future `future`.
-fn residual_step(
-    log: &Log,
-    example: &KnudsenExample,
-    step: ResidualStep,
-    past: usize,
-    future: usize,
-) -> Result<Found, Failure> {
-    let regression = regression(log, past, future)?;
-    let decomposition = Decomposition::new(&regression).map_err(|e| e.to_string())?;
-    let found = knudsen(
-        &regression,
-        &decomposition,
-        example.order(),
-        true,
-        step,
-        log.sample_time,
-    )
-    .map_err(|e| e.to_string())?;
-    Ok((found.system, found.innovation_covariance[(0, 0)]))
-}
-
-fn by_subid(
-    log: &Log,
-    example: &KnudsenExample,
-    weight: ProjectionWeight,
-) -> Result<Vec<f64>, Failure> {
-    let regression = regression(log, example.horizon, example.horizon)?;
-    let found = subid(&regression, example.order(), weight, true, log.sample_time);
-    baseline(found.map_err(|e| e.to_string())?)
-}
-
-fn by_n4sid(
-    log: &Log,
-    example: &KnudsenExample,
-    weight: ProjectionWeight,
-    past: usize,
-    future: usize,
-) -> Result<Vec<f64>, Failure> {
-    let regression = regression(log, past, future)?;
-    let signals = signals(log);
-    let found = n4sid(
-        &regression,
-        &[&signals],
-        example.order(),
-        weight,
-        true,
-        log.sample_time,
-    );
-    baseline(found.map_err(|e| e.to_string())?)
-}
-
-fn baseline(found: BaselineEstimate) -> Result<Vec<f64>, Failure> {
-    finished(&(found.system, found.innovation_covariance[(0, 0)]))
-}
-
-/// The past window of the vector ARX model with the smallest Akaike criterion, as Matlab's n4sid chooses it.
-fn automatic_past(log: &Log) -> Result<usize, Failure> {
-    let longest = raw_factor(log, LONGEST_PAST)?;
-    let mut best = (f64::INFINITY, 1);
-    for past in 1..=LONGEST_PAST {
-        let model = varx(&longest.shortened(past), true).map_err(|e| e.to_string())?;
-        let samples = model.columns as f64;
-        let criterion = samples * (model.sum_of_squares[(0, 0)] / samples).ln()
-            + 2.0 * model.regressors() as f64;
-        if criterion < best.0 {
-            best = (criterion, past);
-        }
-    }
-    Ok(best.1)
-}
-
-fn signals(log: &Log) -> Vec<Vec<f64>> {
-    log.input_data
-        .iter()
-        .chain(&log.output_data)
-        .cloned()
-        .collect()
-}
-
-fn prediction_error(log: &Log, start: &StateSpace, steps: usize) -> Result<Vec<f64>, Failure> {
-    let signals = signals(log);
-    let found = prediction_error_method(start, &[&signals], true, Form::Armax, steps)
-        .map_err(|e| e.to_string())?;
-    let variance = found.innovation_covariance[(0, 0)];
-    match found.armax {
-        Some((armax, _)) => Ok(armax_parameters(&armax, variance)),
-        None => finished(&(found.system, variance)),
-    }
+fn with_long_past(log: &Log, example: &KnudsenExample) -> Result<Vec<f64>, Failure> {
+    let future = example.order() + 2;
+    let factor = raw_factor(log, LONG_PAST + future - 1)?;
+    let estimate = || {
+        let regression = Regression::new(&factor, LONG_PAST)?;
+        let decomposition = Decomposition::new(&regression)?;
+        knudsen(
+            &regression,
+            &decomposition,
+            example.order(),
+            true,
+            ResidualStep::Cholesky,
+            log.sample_time,
+        )
+    };
+    let found = estimate().map_err(|e| e.to_string())?;
+    let armax = found
+        .system
+        .armax()
+        .map_err(|e| e.to_string())?
+        .ok_or("not one input and one output")?;
+    Ok(armax_parameters(
+        &armax,
+        found.innovation_covariance[(0, 0)],
+    ))
 }
 
 /// The Cramer-Rao bound of a recording: variances of an efficient estimate at the truth, initial state unknown. That
 /// of `sigma^2` is `2 sigma^4 / N`.
 pub(super) fn bound(log: &Log, example: &KnudsenExample) -> Result<Vec<f64>, Failure> {
-    let signals = signals(log);
+    let signals: Vec<Vec<f64>> = log
+        .input_data
+        .iter()
+        .chain(&log.output_data)
+        .cloned()
+        .collect();
     let found = prediction_error_method(&example.system.system, &[&signals], true, Form::Armax, 0)
         .map_err(|e| e.to_string())?;
     let (_, covariance) = found.armax.ok_or("no polynomials")?;
@@ -224,11 +117,32 @@ pub(super) fn bound(log: &Log, example: &KnudsenExample) -> Result<Vec<f64>, Fai
     Ok(variances)
 }
 
-/// The parameters of a model with one input and one output.
-fn finished((system, variance): &Found) -> Result<Vec<f64>, Failure> {
-    let armax = system
-        .armax()
-        .map_err(|e| e.to_string())?
-        .ok_or("not one input and one output")?;
-    Ok(armax_parameters(&armax, *variance))
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::systems::knudsen_armax;
+
+    /// The bound of the notes behind this crate (`knudsen.md`, section 6), found with other software.
+    #[test]
+    fn the_bound_is_that_of_the_notes() {
+        let example = knudsen_armax();
+        let count = 40;
+        let mut sum = vec![0.0; example.parameters().len()];
+        for seed in 0..count {
+            let log = example.record(500, seed);
+            for (sum, variance) in sum.iter_mut().zip(bound(&log, &example).unwrap()) {
+                *sum += variance / count as f64;
+            }
+        }
+        let notes = [
+            0.00586, 0.00538, 0.00319, 0.00604, 0.00417, 0.0311, 0.0309, 1.90e-4,
+        ];
+        for (variance, expected) in sum.iter().zip(notes) {
+            assert!(
+                (variance.sqrt() / expected - 1.0).abs() < 0.05,
+                "{} {expected}",
+                variance.sqrt()
+            );
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! What the paper says, held against the study.
 
 use super::errors::{Errors, Outcome};
-use super::methods::{Kind, WITH_LONG_PAST, WITH_STEP};
+use super::methods::{FIXED_HORIZONS, Kind, WITH_LONG_PAST, WITH_STEP};
 use crate::reproduce::document::{Agreement, Comparison};
 use crate::reproduce::words::{number, range};
 
@@ -148,10 +148,7 @@ fn automatic(of: &Errors) -> Option<Comparison> {
         .outcomes
         .iter()
         .find(|o| o.method.kind == Kind::Automatic)?;
-    let fixed = of
-        .outcomes
-        .iter()
-        .find(|o| o.method.kind == Kind::Subspace && o.method.name.starts_with("n4sid"))?;
+    let fixed = of.find(FIXED_HORIZONS)?;
     let ratios: Vec<f64> = of
         .stochastic()
         .map(|k| automatic.rms[k] / fixed.rms[k])
