@@ -11,6 +11,9 @@
 //! | `pbsid_opt` | states by a weighted singular value decomposition, system matrices by least squares | van Wingerden (24)-(34) |
 //! | `stochastic` | `K` and `Lambda` by a step of its own, for any deterministic part | |
 //! | `nested` | states from nested regressions, growing past | Chiuso & Picci; Qin & Ljung |
+//! | `knudsen` | regression of future outputs on past and future inputs; tk, tk-chol | Knudsen |
+//! | `pem` | the prediction error method in the time domain | Ljung |
+//! | `baselines` | subid, an n4sid, the methods of Knudsen's table 2 | van Overschee & De Moor; Ljung |
 //! | `order`, `select` | which order: singular values propose, a chi-square test referees | Bauer 2001 |
 //! | `truncation` | what the past window cuts off | |
 //! | `polish` | the maximum-likelihood model of that order | Soderstrom, Stoica & Friedlander 1991 |

@@ -54,16 +54,16 @@ pub enum Method {
     /// maximum-likelihood polish
     #[default]
     PbsidOpt,
-    /// Predictor-based with nested regressions, also called the whitening filter (Chiuso & Picci)
-    Whitening,
-    /// Innovation estimation (Qin & Ljung): least disturbed by a past window that is short for the noise dynamics
-    InnovationEstimation,
     /// Knudsen's tk-chol (with --stochastic first-column tk); open loop only
     Knudsen,
     /// Prediction error method: maximum likelihood in the time domain, started from tk-chol or PBSID_opt
     Pem,
     /// Robust combined subspace algorithm of van Overschee and De Moor; open loop only
     Subid,
+    /// Predictor-based with nested regressions, also called the whitening filter (Chiuso & Picci)
+    Whitening,
+    /// Innovation estimation (Qin & Ljung): least disturbed by a past window that is short for the noise dynamics
+    InnovationEstimation,
 }
 
 impl Method {
@@ -76,11 +76,11 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::PbsidOpt => "pbsid-opt",
-            Self::Whitening => "whitening",
-            Self::InnovationEstimation => "innovation-estimation",
             Self::Knudsen => "knudsen",
             Self::Pem => "pem",
             Self::Subid => "subid",
+            Self::Whitening => "whitening",
+            Self::InnovationEstimation => "innovation-estimation",
         }
     }
 

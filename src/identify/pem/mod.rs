@@ -15,6 +15,8 @@
 
 mod parametrisation;
 mod sensitivity;
+#[cfg(test)]
+mod tests;
 
 use nalgebra::{DMatrix, DVector};
 

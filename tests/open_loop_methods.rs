@@ -1,0 +1,200 @@
+//! Knudsen's methods, the prediction error method and subid through the whole pipeline: library, command line, JSON.
+
+mod cli_support;
+
+use cli_support::{Folder, json};
+use innovant::covariance::pole_uncertainties;
+use innovant::identify::method::Method;
+use innovant::identify::stochastic::Stochastic;
+use innovant::identify::{Model, Options, Order, Polish, identify};
+use innovant::linalg::{spectral_radius, symmetric_eigen};
+use innovant::log::Log;
+use innovant::model::StateSpace;
+use innovant::systems;
+
+fn options(method: Method, order: usize) -> Options {
+    Options {
+        method,
+        order: Order::Fixed(order),
+        ..Options::default()
+    }
+}
+
+/// Poles within five standard deviations, a covariance that is one, a stable predictor.
+fn check(model: &Model, truth: &StateSpace, what: &str) {
+    let covariance = model.covariance.as_ref().unwrap();
+    let values = symmetric_eigen(&covariance.matrix).unwrap().values;
+    let largest = values.iter().copied().fold(0.0, f64::max);
+    assert!(
+        largest > 0.0 && values.iter().all(|v| *v > -1e-9 * largest),
+        "{what}"
+    );
+    assert!(
+        spectral_radius(&model.system.predictor_matrix()).unwrap() < 1.0,
+        "{what}"
+    );
+    let found = pole_uncertainties(&model.system, covariance).unwrap();
+    for pole in truth.poles().unwrap() {
+        let nearest = found
+            .iter()
+            .min_by(|a, b| {
+                let d =
+                    |p: &innovant::covariance::PoleUncertainty| (p.pole.value - pole.value).norm();
+                d(a).total_cmp(&d(b))
+            })
+            .unwrap();
+        let c = nearest.covariance.unwrap();
+        let std = (c[0][0] + c[1][1]).sqrt();
+        let distance = (nearest.pole.value - pole.value).norm();
+        assert!(
+            distance < 5.0 * std && std < 0.1,
+            "{what}: {distance:.2e}, std {std:.2e}"
+        );
+    }
+}
+
+fn held(example: &systems::TestSystem, samples: usize, seed: u64) -> Log {
+    example.record(samples, seed)
+}
+
+#[test]
+fn every_method_finds_the_armax_system() {
+    let example = systems::knudsen_armax();
+    let log = example.record(3000, 5);
+    let truth = &example.system.system;
+    for method in [Method::Knudsen, Method::Pem, Method::Subid] {
+        for polish in [Polish::Auto, Polish::Always] {
+            let model = identify(
+                std::slice::from_ref(&log),
+                &Options {
+                    polish,
+                    ..options(method, 2)
+                },
+            )
+            .unwrap();
+            let what = format!("{} {polish:?}", method.name());
+            check(&model, truth, &what);
+            let summary = model.summary.as_ref().unwrap();
+            assert_eq!(summary.method, method);
+            assert_eq!(summary.polished, polish == Polish::Always, "{what}");
+            let variance = model.innovation_covariance.as_ref().unwrap()[(0, 0)];
+            assert!(
+                (variance / example.variance - 1.0).abs() < 0.2,
+                "{what}: {variance}"
+            );
+            // Only subid has no formula, and takes the jackknife.
+            let blocks = summary.diagnostics.jackknife_blocks;
+            let jackknife = method == Method::Subid && polish != Polish::Always;
+            assert_eq!(blocks.is_some(), jackknife, "{what}");
+        }
+    }
+}
+
+#[test]
+fn several_inputs_and_outputs_and_feedthrough() {
+    let mut example = systems::two_by_two();
+    example.system.d[(0, 1)] = 0.4;
+    let log = held(&example, 4000, 3);
+    for method in [Method::Knudsen, Method::Pem] {
+        let model = identify(
+            std::slice::from_ref(&log),
+            &Options {
+                feedthrough: true,
+                ..options(method, 3)
+            },
+        )
+        .unwrap();
+        check(&model, &example.system, method.name());
+        let d = &model.system.d;
+        assert!(
+            (d[(0, 1)] - 0.4).abs() < 0.05 && d[(1, 0)].abs() < 0.05,
+            "{d}"
+        );
+    }
+}
+
+/// Any deterministic part with any stochastic step.
+#[test]
+fn stochastic_steps_go_with_every_method() {
+    let example = systems::knudsen_armax();
+    let log = example.record(2000, 8);
+    let truth = example.system.system.noise_response(0.7)[(0, 0)];
+    for method in [Method::PbsidOpt, Method::Knudsen, Method::Subid] {
+        for step in [
+            Stochastic::FirstColumn,
+            Stochastic::Cholesky,
+            Stochastic::Innovations,
+        ] {
+            let model = identify(
+                std::slice::from_ref(&log),
+                &Options {
+                    stochastic: Some(step),
+                    past: Some(12),
+                    future: (method != Method::Subid).then_some(6),
+                    ..options(method, 2)
+                },
+            )
+            .unwrap();
+            let what = format!("{} {}", method.name(), step.name());
+            let found = model.system.noise_response(0.7)[(0, 0)];
+            assert!(
+                (found - truth).norm() < 0.25 * truth.norm(),
+                "{what}: {found} {truth}"
+            );
+            assert_eq!(model.summary.unwrap().stochastic, Some(step));
+        }
+    }
+}
+
+/// A loop with a delay: the prediction error method is not misled.
+#[test]
+fn the_prediction_error_method_works_in_closed_loop() {
+    let example = systems::van_wingerden_one();
+    let log = held(&example, 3000, 2);
+    let model = identify(std::slice::from_ref(&log), &options(Method::Pem, 4)).unwrap();
+    check(&model, &example.system, "pem");
+}
+
+#[test]
+fn orders_are_chosen_with_every_method() {
+    let example = systems::knudsen_armax();
+    let log = example.record(3000, 6);
+    for method in [Method::Knudsen, Method::Pem, Method::Subid] {
+        let automatic = Options {
+            method,
+            ..Options::default()
+        };
+        let model = identify(std::slice::from_ref(&log), &automatic).unwrap();
+        assert_eq!(model.system.states(), 2, "{}", method.name());
+    }
+}
+
+#[test]
+fn the_command_line_takes_the_names_and_the_document_gives_them() {
+    let folder = Folder::new();
+    folder.recording("log.csv", &systems::servo(), 3000, 1);
+    for (method, extra) in [
+        ("knudsen", ["--stochastic", "first-column"]),
+        ("pem", ["--polish", "never"]),
+        ("subid", ["--past", "12"]),
+    ] {
+        let mut line = vec!["identify", "log.csv", "--order", "3", "--method", method];
+        line.extend(extra);
+        line.extend(["--output", "model.json"]);
+        folder.run(&line).ok();
+        let model = json(&folder.join("model.json"));
+        assert_eq!(model["method"], method);
+        if method == "knudsen" {
+            assert_eq!(model["stochastic"], "first-column");
+            assert_eq!(model["horizons"]["future"], 5);
+        }
+        let std = model["invariants"]["poles"][0]["natural_frequency_std"].as_f64();
+        assert!(std.is_some_and(|s| s > 0.0), "{method}");
+    }
+    let wrong = folder.run(&[
+        "identify", "log.csv", "--order", "3", "--method", "knudsen", "--past", "6", "--future",
+        "3",
+    ]);
+    let text = wrong.error();
+    assert!(text.contains("order 3 is not possible"), "{text}");
+}
