@@ -40,7 +40,7 @@
 //! |---|---|
 //! | [`log`] | recordings: CSV in and out, column roles, units, sampling |
 //! | [`moments`] | one pass over the data: lag moments, and from them the triangular factor `R` |
-//! | [`identify`](mod@identify) | windows, order, PBSID_opt, polish to maximum likelihood, the [`Model`] |
+//! | [`identify`](mod@identify) | windows, order, methods, polish to maximum likelihood, the [`Model`] |
 //! | [`model`] | what a state-space system does: simulate, predict, frequency response, poles, zeros |
 //! | [`covariance`] | the covariance of the parameters, and of what follows from them |
 //! | [`validate`] | fit, and residual tests that stay honest in closed loop and under coloured noise |
