@@ -33,8 +33,8 @@ pub(super) struct Method {
 pub(super) const REFERENCE: &str = "tk-chol";
 /// tk-chol with a longer past.
 pub(super) const WITH_LONG_PAST: &str = "tk-chol, i = 20";
-/// The same with one Gauss-Newton step of the prediction error.
-pub(super) const WITH_STEP: &str = "tk-chol, i = 20, one step";
+/// The same with two Gauss-Newton steps of the prediction error.
+pub(super) const WITH_STEPS: &str = "tk-chol, i = 20, two steps";
 /// The n4sid-like method with fixed horizons that its automatic form is held against.
 pub(super) const FIXED_HORIZONS: &str = "n4sid-like CVA";
 /// Past horizon of [`WITH_LONG_PAST`].
@@ -61,7 +61,7 @@ pub(super) fn methods() -> Vec<Method> {
         method("n4sid-like, automatic", Automatic, of_table!(N4sidAuto)),
         method("prediction error", PredictionError, of_table!(Pem)),
         method(WITH_LONG_PAST, Added, with_long_past),
-        method(WITH_STEP, Added, of_table!(Polished)),
+        method(WITH_STEPS, Added, of_table!(Polished)),
     ]
 }
 
