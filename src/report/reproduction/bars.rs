@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::view::typeset;
 use crate::report::drawing::number::{exact, number};
 use crate::reproduce::Bars;
 
@@ -117,14 +118,14 @@ pub(super) fn chart(of: &Bars) -> Chart {
                 })
                 .collect();
             GroupOfBars {
-                name: name.clone(),
+                name: typeset(name),
                 middle: place(from + (group_width - GAP) / 2.0),
                 base: place(TOP + HEIGHT + 17.0),
                 bars,
             }
         })
         .collect();
-    let width = LEFT + group_width * of.groups.len() as f64;
+    let width = LEFT + group_width * of.groups.len() as f64 + GAP;
     let names: Vec<&str> = of.series.iter().map(|s| s.name.as_str()).collect();
     Chart {
         id: of.id.clone(),

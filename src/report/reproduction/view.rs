@@ -62,8 +62,10 @@ struct NumberRow {
 }
 
 /// Symbols that plain text has to do without.
-fn typeset(text: &str) -> String {
+pub(super) fn typeset(text: &str) -> String {
     text.replace("+-", "±")
+        .replace("sigma^2", "σ²")
+        .replace("sigma2", "σ²")
 }
 
 /// The class of an agreement in the style sheet.
@@ -100,7 +102,7 @@ fn table(of: &Table) -> NumberTable {
         title: of.title.clone(),
         caption: of.caption.clone(),
         rows_are: of.rows_are.clone(),
-        columns: of.columns.clone(),
+        columns: of.columns.iter().map(|c| typeset(c)).collect(),
         rows: of
             .rows
             .iter()

@@ -23,7 +23,7 @@ pub(super) struct Bounds {
     pub(super) others_in_first: f64,
     /// The same, of every run in turn.
     pub(super) others: f64,
-    /// Predicted over Monte Carlo variance of the response.
+    /// Mean predicted over Monte Carlo variance of the response, as a geometric mean over its entries.
     pub(super) variance_ratio: f64,
     /// Root mean square over the runs of the error relative to the magnitude, as a geometric mean over the entries
     /// of the response: a zero of the plant, where any error is large, does not decide.
@@ -114,7 +114,7 @@ pub(super) fn bounds(runs: &[Response], truth: &[DMatrix<Complex64>], at: &[usiz
                 .iter()
                 .map(|run| run.covariance[w][e][0][0] + run.covariance[w][e][1][1])
                 .collect();
-            mean(&predicted) * (values.len() - 1) as f64 / scatter
+            (mean(&predicted) * (values.len() - 1) as f64 / scatter).ln()
         })
         .collect();
     let errors: Vec<f64> = entries
@@ -132,7 +132,7 @@ pub(super) fn bounds(runs: &[Response], truth: &[DMatrix<Complex64>], at: &[usiz
         ellipse,
         others_in_first: others[0],
         others: mean(&others),
-        variance_ratio: mean(&ratios),
+        variance_ratio: mean(&ratios).exp(),
         relative_error: mean(&errors).exp(),
     }
 }

@@ -94,9 +94,9 @@ impl Experiment for VanWingerdenOne {
             document.remarks.extend(outcome.failures());
         }
         document.remarks.push(
-            "p = f = 100 spends 400 of 1900 windows on the vector ARX model of a plant whose predictor has forgotten \
-             everything after 10 samples: the first-order variance is too small then. A window chosen by Akaike's \
-             criterion, f < p, and the polish repair it: last row of the tables."
+            "p = f = 100 spends 400 regressors on 1900 windows of a plant whose predictor has forgotten everything after \
+             10 samples. First-order variances come out too small then. A \
+             window chosen by Akaike's criterion, f < p, and the polish repair it: last row of the tables."
                 .to_owned(),
         );
         Ok(document)
