@@ -167,7 +167,7 @@ mod tests {
             ];
             for (which, estimate) in found.iter().enumerate() {
                 for (t, f) in truth.iter().zip(estimate.system.impulse_response(10)) {
-                    assert!((t - f).amax() < 1e-5, "{which} {weight:?}: {t} {f}");
+                    assert!((t - &f).amax() < 1e-5, "{which} {weight:?}: {t} {f}");
                 }
                 assert!(estimate.innovation_covariance[(0, 0)] < 1e-12);
             }

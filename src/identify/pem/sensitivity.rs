@@ -130,8 +130,8 @@ pub fn linearised_errors(
             }
             for (i, slot) in next.iter_mut().enumerate() {
                 let mut sum = 0.0;
-                for j in 0..n {
-                    sum += system.a[(i, j)] * x[j];
+                for (j, value) in x.iter().enumerate() {
+                    sum += system.a[(i, j)] * value;
                 }
                 for j in 0..inputs {
                     sum += system.b[(i, j)] * regressor[n + j];
