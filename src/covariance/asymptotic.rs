@@ -2,8 +2,8 @@
 //!
 //! For studies: what an estimated covariance is to be compared with. The formulas are those that the data-based
 //! covariances use, with every sample covariance replaced by the exact one, which Lyapunov's equation of the closed
-//! loop gives. Nothing is simulated. As in the estimate, the state is the one that the past window makes,
-//! `E[x | z[t-p .. t)]`, and the residual the one that it leaves.
+//! loop gives. Nothing is simulated. As in the estimate, the state is the one that the past window makes, and the residual
+//! the one that it leaves.
 
 use nalgebra::DMatrix;
 
@@ -56,12 +56,25 @@ pub fn asymptotic_covariance(
     let solve = |right: &DMatrix<f64>| {
         solve_upper(&past_factor, &solve_upper_transposed(&past_factor, right))
     };
-    let state_of_past = solve(&moments.past_with_state(past, n)).transpose();
     let coefficients = solve(
         &window
             .view((0, width + inputs), (width, outputs))
             .into_owned(),
     );
+    let state_map = state_map(closed_loop, method, weight, future)?;
+    let state_of_past = match method {
+        AsymptoticMethod::Nested(_) => solve(&moments.past_with_state(past, n)).transpose(),
+        // The state of PBSID_opt comes from the vector ARX model, shifted: van Wingerden (25).
+        AsymptoticMethod::PbsidOpt => {
+            let mut stacked = DMatrix::zeros(future * outputs, width);
+            for i in 0..future.min(past) {
+                stacked
+                    .view_mut((i * outputs, i * q), (outputs, width - i * q))
+                    .copy_from(&coefficients.transpose().columns(0, width - i * q));
+            }
+            multiply(&state_map, &stacked)
+        }
+    };
 
     // [x; u; e] as functions of the window, and its regression on them.
     let mut regressors = DMatrix::zeros(n + q, width + q);
@@ -85,7 +98,6 @@ pub fn asymptotic_covariance(
         Ok(solve_upper(&factor, &solve_upper_transposed(&factor, &cross)).transpose())
     };
 
-    let state_map = state_map(closed_loop, method, weight, future)?;
     let state_regression = regression(n + q)?;
     let output_regression = regression(n)?;
     match method {

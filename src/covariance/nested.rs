@@ -151,14 +151,10 @@ impl NestedErrors<'_> {
         // The state as a function of the regressors.
         let selects = |columns: usize| DMatrix::<f64>::identity(n, columns);
 
-        let mut sink = Sink {
-            parameters: DMatrix::zeros(layout.len(), outputs * size),
-            noise: &noise,
-        };
+        let mut terms = Vec::with_capacity(3 * future + 2);
         let current = self.state_regression.rows(0, width).into_owned();
         let of_outputs = self.output_regression.rows(0, width).into_owned();
         let errors = Errors {
-            inverse: &inverse,
             observability: &observability,
             of_outputs: self.prediction == Prediction::InnovationEstimation,
             channels: q,
@@ -170,23 +166,20 @@ impl NestedErrors<'_> {
         for k in 0..future {
             let block = |m: &DMatrix<f64>| m.columns(k * outputs, outputs).into_owned();
             let longer = errors.of(k, self.past + 1, self.state_regression, &abk);
-            sink.add(0, &block(&map), &longer);
+            terms.push((0, block(&map), longer));
             let now = errors.of(k, self.past, &current, &selects(n + q));
-            sink.add(0, &block(&minus_a_map), &now);
+            terms.push((0, block(&minus_a_map), now));
             let out = errors.of(k, self.past, &of_outputs, &selects(of_outputs.ncols()));
-            sink.add(first_output, &block(&minus_c_map), &out);
+            terms.push((first_output, block(&minus_c_map), out));
         }
         // The residual and the output themselves: dTheta_0 on everything it was regressed on.
         let whole = |zeta: &DMatrix<f64>| errors.of_first(self.past, zeta);
-        sink.add(0, &self.system.k, &whole(self.state_regression));
-        sink.add(
-            first_output,
-            &DMatrix::identity(outputs, outputs),
-            &whole(self.output_regression),
-        );
+        let identity = DMatrix::identity(outputs, outputs);
+        terms.push((0, self.system.k.clone(), whole(self.state_regression)));
+        terms.push((first_output, identity, whole(self.output_regression)));
         let coefficients = self.coefficient_errors(&inverse, &noise);
         Ok(Propagation {
-            parameters: sink.parameters,
+            parameters: collected(&terms, &inverse, &noise, layout.len()),
             coefficients,
         })
     }
@@ -213,9 +206,9 @@ impl NestedErrors<'_> {
     }
 }
 
-/// Errors `dTheta_k` applied to vectors, as combinations of the columns of `Omega`.
+/// Vectors that the errors `dTheta_k` are multiplied by, in the order of `w` and without what is beyond regression
+/// `k`: `dTheta_k` times such a vector `v` of length `d_k` is `F Omega[:, ..d_k] R_k'^-1 v`.
 struct Errors<'a> {
-    inverse: &'a DMatrix<f64>,
     observability: &'a [DMatrix<f64>],
     /// Whether the coefficients on future outputs count.
     of_outputs: bool,
@@ -226,9 +219,9 @@ struct Errors<'a> {
 }
 
 impl Errors<'_> {
-    /// Regression `k` after a past of `past` samples: its error times `zeta` (`past q x m`, oldest block first) and, for
-    /// innovation estimation, times the future outputs `C A^j x` of the states `states` (`n x m`). The result
-    /// (`d x m`) multiplies `Omega`.
+    /// Regression `k` after a past of `past` samples: its coefficients on the past meet `zeta` (`past q x m`, oldest
+    /// block first) and, for innovation estimation, those on the future outputs meet `C A^j x` of the states `states`
+    /// (`n x m`).
     fn of(
         &self,
         k: usize,
@@ -238,8 +231,7 @@ impl Errors<'_> {
     ) -> DMatrix<f64> {
         let q = self.channels;
         let blocks = past + k;
-        let used = blocks * q + self.direct;
-        let mut vectors = DMatrix::zeros(used, zeta.ncols());
+        let mut vectors = DMatrix::zeros(blocks * q + self.direct, zeta.ncols());
         for block in 0..past {
             let newest = self.direct + (blocks - 1 - block) * q;
             vectors
@@ -254,45 +246,56 @@ impl Errors<'_> {
                     .copy_from(&(row * states));
             }
         }
-        self.whitened(&vectors)
+        vectors
     }
 
-    /// `dTheta_0` times everything it was regressed on: `zeta` with its last block, of which only the inputs count,
+    /// Regression 0 and everything it was regressed on: `zeta` with its last block, of which only the inputs count,
     /// and only with feedthrough.
     fn of_first(&self, past: usize, zeta: &DMatrix<f64>) -> DMatrix<f64> {
         let order = newest_first(past, self.channels, self.direct);
-        let vectors = DMatrix::from_fn(order.len(), zeta.ncols(), |i, j| zeta[(order[i], j)]);
-        self.whitened(&vectors)
-    }
-
-    fn whitened(&self, vectors: &DMatrix<f64>) -> DMatrix<f64> {
-        let used = vectors.nrows();
-        let leading = self.inverse.view((0, 0), (used, used)).into_owned();
-        multiply(&leading, vectors)
+        DMatrix::from_fn(order.len(), zeta.ncols(), |i, j| zeta[(order[i], j)])
     }
 }
 
-/// Collects `left F Omega t` into the rows of the parameters.
-struct Sink<'a> {
-    parameters: DMatrix<f64>,
-    noise: &'a DMatrix<f64>,
-}
-
-impl Sink<'_> {
-    /// Adds `left F Omega t`, `left` of `rows x l`, to the parameters from `first` on, `rows` per column of `t`.
-    fn add(&mut self, first: usize, left: &DMatrix<f64>, t: &DMatrix<f64>) {
-        let left = left * self.noise;
-        let (rows, outputs) = left.shape();
-        for w in 0..t.nrows() {
-            for v in 0..outputs {
-                let mut column = self.parameters.column_mut(v + outputs * w);
-                for c in 0..t.ncols() {
-                    let factor = t[(w, c)];
+/// The sum of `left F Omega R'^-1 v` over the terms `(first, left, v)`, `left` of `rows x l`, in the parameters from
+/// `first` on, `rows` of them per column of `v`.
+fn collected(
+    terms: &[(usize, DMatrix<f64>, DMatrix<f64>)],
+    inverse: &DMatrix<f64>,
+    noise: &DMatrix<f64>,
+    parameters: usize,
+) -> DMatrix<f64> {
+    let size = inverse.nrows();
+    let outputs = noise.nrows();
+    // All vectors side by side: one large product instead of many small ones.
+    let mut vectors = DMatrix::zeros(size, terms.iter().map(|t| t.2.ncols()).sum());
+    let mut from = 0;
+    for (_, _, v) in terms {
+        vectors
+            .view_mut((0, from), (v.nrows(), v.ncols()))
+            .copy_from(v);
+        from += v.ncols();
+    }
+    let whitened = multiply(inverse, &vectors);
+    let mut out = DMatrix::zeros(parameters, outputs * size);
+    let mut from = 0;
+    for (first, left, v) in terms {
+        let left = left * noise;
+        let rows = left.nrows();
+        // The factor is triangular: the inverse of a leading block is the leading block of the inverse, and
+        // what the whole one adds further down belongs to no regressor of this regression.
+        for w in 0..v.nrows() {
+            for o in 0..outputs {
+                let mut column = out.column_mut(o + outputs * w);
+                for c in 0..v.ncols() {
+                    let factor = whitened[(w, from + c)];
                     for a in 0..rows {
-                        column[first + rows * c + a] += left[(a, v)] * factor;
+                        column[first + rows * c + a] += left[(a, o)] * factor;
                     }
                 }
             }
         }
+        from += v.ncols();
     }
+    out
 }
