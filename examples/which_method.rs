@@ -1,8 +1,8 @@
 //! Which method when: every method of `identify` in six situations, by Monte Carlo.
 //!
-//! `cargo run --release --example which_method [RUNS]` prints the tables of `docs/which-method.md`. The order is the
-//! true one; windows and everything else are what `innovant identify --method M --order N` chooses. Times are relative
-//! to the first method.
+//! `cargo run --release --example which_method [RUNS [PART OF A NAME]]` prints the tables of
+//! `docs/which-method.md`. The order is the true one; windows and everything else are what
+//! `innovant identify --method M --order N` chooses. Times are relative to the first method.
 
 use std::time::Instant;
 
@@ -185,7 +185,11 @@ fn main() {
         Method::PbsidOpt,
         Polish::Auto,
     ));
+    let part = std::env::args().nth(2).unwrap_or_default();
     for situation in situations() {
+        if !situation.name.contains(&part) {
+            continue;
+        }
         let mut reference = None;
         println!("\n### {}\n", situation.name);
         println!(
