@@ -46,6 +46,7 @@
 //! | [`validate`] | fit, and residual tests that stay honest in closed loop and under coloured noise |
 //! | [`explain`](mod@explain) | what a simulation leaves out: located, named, fitted, proved |
 //! | [`report`] | JSON documents with their schema, tables for people |
+//! | [`reproduce`] | the papers' experiments, run again, beside what the papers print |
 //! | [`cli`] | the command line |
 //! | [`linalg`] | the only place that names faer |
 //! | [`systems`] | the papers' examples, simulated, for tests and benchmarks |
@@ -65,6 +66,7 @@ pub mod log;
 pub mod model;
 pub mod moments;
 pub mod report;
+pub mod reproduce;
 pub mod systems;
 pub mod validate;
 

@@ -11,10 +11,12 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::log::{Channel, Log};
 use crate::model::StateSpace;
 
+mod acoustic_duct;
 mod chiuso_picci;
 mod closed_loop;
 mod knudsen;
 
+pub use acoustic_duct::acoustic_duct;
 pub use chiuso_picci::{chiuso_picci_frequencies, chiuso_picci_one, chiuso_picci_two};
 pub use closed_loop::{ClosedLoop, JointModel};
 pub use knudsen::{KnudsenExample, armax_parameters, knudsen_armax, knudsen_bj, knudsen_vo};

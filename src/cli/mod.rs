@@ -12,6 +12,7 @@ mod identify;
 mod numbers;
 mod output;
 mod progress;
+mod reproduce;
 mod roles;
 mod schema;
 mod show;
@@ -38,6 +39,7 @@ const EXAMPLE: &str = "Example:
   innovant explain log.csv --simulation sim.csv    what did the simulation leave out?
   innovant simulate model.json input.csv > out.csv
   innovant show model.json
+  innovant reproduce all                           the papers' tables and figures, run again
 
 Exit codes: 0 done; 1 the model or simulation was rejected; 2 an error.";
 
@@ -68,6 +70,7 @@ enum Command {
     Validate(validate::Flags),
     Simulate(simulate::Flags),
     Show(show::Flags),
+    Reproduce(reproduce::Flags),
     Schema(schema::Flags),
     Completions(completions::Flags),
 }
@@ -117,6 +120,7 @@ fn dispatch(cli: Cli) -> anyhow::Result<Outcome> {
         Some(Command::Validate(flags)) => validate::run(flags, say),
         Some(Command::Simulate(flags)) => simulate::run(flags, say),
         Some(Command::Show(flags)) => show::run(flags),
+        Some(Command::Reproduce(flags)) => reproduce::run(flags, say),
         Some(Command::Schema(flags)) => schema::run(&flags),
         Some(Command::Completions(flags)) => completions::run(&flags),
     }

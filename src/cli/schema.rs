@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 
 use super::Outcome;
 use super::output::print;
-use crate::report::{explanation_schema, model_schema};
+use crate::report::{explanation_schema, model_schema, reproduction_schema};
 
 const EXAMPLE: &str = "Example:
   innovant schema model > innovant-model-1.schema.json";
@@ -23,12 +23,15 @@ enum Document {
     Model,
     /// innovant-explanation/1, what `innovant explain --output` writes
     Explanation,
+    /// innovant-reproduction/1, what `innovant reproduce` writes
+    Reproduction,
 }
 
 pub(super) fn run(flags: &Flags) -> anyhow::Result<Outcome> {
     match flags.document {
         Document::Model => print(&model_schema()?)?,
         Document::Explanation => print(&explanation_schema()?)?,
+        Document::Reproduction => print(&reproduction_schema()?)?,
     }
     Ok(Outcome::Done)
 }

@@ -24,6 +24,16 @@ use crate::linalg::{
 
 /// Jacobian of `theta` with respect to `vec M`, entry `(parameter, o + l j)` for `M[o, j]`.
 pub fn subspace_jacobian(estimate: &Estimate, varx: &Varx) -> (ParameterLayout, DMatrix<f64>) {
+    jacobian_with_sign(estimate, varx, 1.0)
+}
+
+/// The Jacobian with the paper's terms beta times `sign`: plus one is right, minus one is what (B.2) and (B.4)
+/// print, which only a comparison with the paper has a use for.
+pub(crate) fn jacobian_with_sign(
+    estimate: &Estimate,
+    varx: &Varx,
+    sign: f64,
+) -> (ParameterLayout, DMatrix<f64>) {
     let system = &estimate.system;
     let (n, inputs, outputs) = (system.states(), system.inputs(), system.outputs());
     let q = inputs + outputs;
@@ -50,7 +60,7 @@ pub fn subspace_jacobian(estimate: &Estimate, varx: &Varx) -> (ParameterLayout, 
         n,
         0,
         outputs,
-        &system.k,
+        &(&system.k * sign),
         &zeta.rows(0, regressors).into_owned(),
     );
 
@@ -68,7 +78,7 @@ pub fn subspace_jacobian(estimate: &Estimate, varx: &Varx) -> (ParameterLayout, 
         &minus_c_map,
         &current,
     );
-    let identity = DMatrix::identity(outputs, outputs);
+    let identity = DMatrix::identity(outputs, outputs) * sign;
     add_direct(
         &mut jacobian,
         outputs,

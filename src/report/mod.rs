@@ -8,8 +8,11 @@
 //! | `json`           | how JSON is laid out; `location`: where in it something stands    |
 //! | `schema`         | the JSON Schema                                                   |
 //! | `text`           | tables for a terminal                                             |
+//! | `page`, `reproduction` | pages of explanations and reproductions                     |
+//! | `drawing`        | what pages are drawn with                                         |
 
 mod channels;
+mod drawing;
 mod error;
 mod json;
 mod location;
@@ -19,10 +22,12 @@ mod packed;
 mod page;
 mod read;
 mod read_explanation;
+mod reproduction;
 mod schema;
 pub mod text;
 
 pub use channels::{InputDocument, OutputDocument};
+pub use drawing::PageError;
 pub use error::DocumentError;
 pub(crate) use json::to_json;
 pub use matrix::Rows;
@@ -31,7 +36,8 @@ pub use model_document::{
     DiagnosticsDocument, InvariantsDocument, MODEL_FORMAT, ModelDocument, Provenance,
 };
 pub use packed::CovarianceDocument;
-pub use page::{PageError, explanation_page};
+pub use page::explanation_page;
 pub use read::{ReadModel, parse_model, read_model};
 pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
-pub use schema::{explanation_schema, model_schema};
+pub use reproduction::{reproduction_csv, reproduction_page};
+pub use schema::{explanation_schema, model_schema, reproduction_schema};

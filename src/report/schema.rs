@@ -29,3 +29,15 @@ pub fn explanation_schema() -> Result<String, DocumentError> {
         .into_root_schema_for::<crate::explain::Explanation>();
     Ok(to_json(&schema)?)
 }
+
+/// The JSON Schema (draft 2020-12) of `innovant-reproduction/1` as it is written.
+///
+/// # Errors
+/// [`DocumentError::Json`], which should not happen.
+pub fn reproduction_schema() -> Result<String, DocumentError> {
+    let schema = SchemaSettings::draft2020_12()
+        .for_serialize()
+        .into_generator()
+        .into_root_schema_for::<crate::reproduce::Reproduction>();
+    Ok(to_json(&schema)?)
+}

@@ -4,25 +4,19 @@
 //! |------------------|-----------------------------------------------------------------------|
 //! | `view`           | everything the template is given                                      |
 //! | `signals`, `maps`| the pictures over time; over frequency and over the learned law       |
-//! | `plot`, `axis`, `trace` | a picture, its axes and ticks, its lines as SVG                |
 //! | `proof`          | fit step by step, with the bootstrap interval                         |
 //! | `findings`       | effects, places, rivals                                               |
 //! | `closing`        | what is left, noise, provenance                                       |
-//! | `number`, `words`| how numbers and effects are written                                   |
-//! | `page.html`, `picture.html`, `sections.html`, `page.css`, `page.js` | the templates, the looks, the interaction |
+//! | `words`          | how effects are called                                                |
+//! | `page.html`, `sections.html` | the templates                                             |
 //!
-//! The pictures are complete without the script: it adds zoom and readout, and reads the values back from the lines.
+//! Pictures, numbers, looks and interaction come from `drawing`, which all pages share.
 
-mod axis;
 mod closing;
-mod error;
 mod findings;
 mod maps;
-mod number;
-mod plot;
 mod proof;
 mod signals;
-mod trace;
 mod view;
 mod words;
 
@@ -31,19 +25,14 @@ pub(crate) mod fixtures;
 #[cfg(test)]
 mod tests;
 
-use minijinja::syntax::SyntaxConfig;
+use minijinja::context;
 use minijinja::value::{Serde, Value};
-use minijinja::{AutoEscape, Environment, UndefinedBehavior, context};
 
-pub use error::PageError;
-
+use super::drawing::{self, PageError, SCRIPT, STYLE, axis, number, plot};
 use crate::explain::Explanation;
 
 const PAGE: &str = include_str!("page.html");
 const SECTIONS: &str = include_str!("sections.html");
-const PICTURE: &str = include_str!("picture.html");
-const STYLE: &str = include_str!("page.css");
-const SCRIPT: &str = include_str!("page.js");
 
 /// The explanation as a page to open in a browser.
 ///
@@ -53,16 +42,7 @@ const SCRIPT: &str = include_str!("page.js");
 ///
 /// When the template cannot be filled, which no explanation should bring about.
 pub fn explanation_page(explanation: &Explanation) -> Result<String, PageError> {
-    let mut templates = Environment::new();
-    templates.set_auto_escape_callback(|_| AutoEscape::Html);
-    templates.set_undefined_behavior(UndefinedBehavior::Strict);
-    templates.set_syntax(
-        SyntaxConfig::builder()
-            .trim_blocks(true)
-            .lstrip_blocks(true)
-            .build()?,
-    );
-    templates.add_template("picture", PICTURE)?;
+    let mut templates = drawing::templates()?;
     templates.add_template("sections", SECTIONS)?;
     templates.add_template("page", PAGE)?;
     let page = templates.get_template("page")?;

@@ -5,11 +5,11 @@ use serde::Serialize;
 use super::number::{fixed, number, power_of_ten};
 
 /// Width and height of a picture in its own coordinates.
-pub(super) const SIZE: f64 = 100_000.0;
+pub(in crate::report) const SIZE: f64 = 100_000.0;
 
 /// A range of numbers along one edge of a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Axis {
+pub(in crate::report) struct Axis {
     /// Left or lower end; the decimal logarithm of it on a logarithmic axis.
     from: f64,
     /// Right or upper end, likewise.
@@ -19,16 +19,16 @@ pub(super) struct Axis {
 
 /// A label on an axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Tick {
+pub(in crate::report) struct Tick {
     /// Per cent of the way from left to right, or from top to bottom.
-    pub(super) at: String,
+    pub(in crate::report) at: String,
     /// What it says.
-    pub(super) label: String,
+    pub(in crate::report) label: String,
 }
 
 /// What the template needs of an axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct AxisView {
+pub(in crate::report) struct AxisView {
     from: String,
     to: String,
     logarithmic: bool,
@@ -41,7 +41,7 @@ pub(super) struct AxisView {
 
 impl Axis {
     /// From the smallest to the largest finite value; `None` without any.
-    pub(super) fn over(values: impl IntoIterator<Item = f64>) -> Option<Self> {
+    pub(in crate::report) fn over(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let (from, to) = values
             .into_iter()
             .filter(|v| v.is_finite() && v.abs() < 1e100)
@@ -66,7 +66,7 @@ impl Axis {
     }
 
     /// The same with room at both ends.
-    pub(super) fn padded(self) -> Self {
+    pub(in crate::report) fn padded(self) -> Self {
         let room = 0.06 * (self.to - self.from);
         Self {
             from: self.from - room,
@@ -76,7 +76,7 @@ impl Axis {
     }
 
     /// The same, logarithmic where the values are positive and span more than a decade and a bit.
-    pub(super) fn logarithmic_if_wide(self) -> Self {
+    pub(in crate::report) fn logarithmic_if_wide(self) -> Self {
         if self.from > 0.0 && self.to > 20.0 * self.from {
             Self {
                 from: self.from.log10(),
@@ -88,8 +88,30 @@ impl Axis {
         }
     }
 
+    /// The same, logarithmic where the values are positive.
+    pub(in crate::report) fn logarithmic(self) -> Self {
+        if self.from > 0.0 && !self.logarithmic {
+            Self {
+                from: self.from.log10(),
+                to: self.to.log10(),
+                logarithmic: true,
+            }
+        } else {
+            self
+        }
+    }
+
+    /// The value at the lower end.
+    pub(in crate::report) fn lowest(&self) -> f64 {
+        if self.logarithmic {
+            10f64.powf(self.from)
+        } else {
+            self.from
+        }
+    }
+
     /// Where a value lies, 0 at the lower and 1 at the upper end; not finite where it has no place.
-    pub(super) fn share(&self, value: f64) -> f64 {
+    pub(in crate::report) fn share(&self, value: f64) -> f64 {
         let value = if self.logarithmic {
             value.log10()
         } else {
@@ -99,7 +121,7 @@ impl Axis {
     }
 
     /// An interval as shares, cut to the axis; `None` when it lies outside.
-    pub(super) fn cut(&self, from: f64, to: f64) -> Option<(f64, f64)> {
+    pub(in crate::report) fn cut(&self, from: f64, to: f64) -> Option<(f64, f64)> {
         let below = self.logarithmic && from <= 0.0;
         let a = if below {
             0.0
@@ -148,19 +170,30 @@ impl Axis {
         let first = self.from.floor().clamp(-99.0, 99.0) as i32;
         let last = self.to.ceil().clamp(-99.0, 99.0) as i32;
         (first..=last)
-            .flat_map(|decade| between.iter().map(move |m| m * 10f64.powi(decade)))
-            .filter(|v| (self.from..=self.to).contains(&v.log10()))
-            .map(|v| (v, number(v, 1)))
+            .flat_map(|decade| between.iter().map(move |m| (*m, decade)))
+            .map(|(m, decade)| (m * 10f64.powi(decade), m, decade))
+            .filter(|(v, ..)| (self.from..=self.to).contains(&v.log10()))
+            .map(|(v, m, decade)| {
+                let bare = m == 1.0 && !(-3..5).contains(&decade);
+                (
+                    v,
+                    if bare {
+                        power_of_ten(decade)
+                    } else {
+                        number(v, 1)
+                    },
+                )
+            })
             .collect()
     }
 
     /// The axis as the horizontal one of a picture.
-    pub(super) fn horizontal(&self, label: &str, unit: &str) -> AxisView {
+    pub(in crate::report) fn horizontal(&self, label: &str, unit: &str) -> AxisView {
         self.view(label, unit, 7.0, |share| share)
     }
 
     /// The axis as the vertical one of a picture.
-    pub(super) fn vertical(&self, label: &str, unit: &str, count: f64) -> AxisView {
+    pub(in crate::report) fn vertical(&self, label: &str, unit: &str, count: f64) -> AxisView {
         self.view(label, unit, count, |share| 1.0 - share)
     }
 

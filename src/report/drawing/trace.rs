@@ -15,7 +15,11 @@ fn point(x: &Axis, y: &Axis, at: f64, value: f64) -> Option<(i64, i64)> {
 }
 
 /// A line through the points; it is broken where a value is not finite.
-pub(super) fn line(x: &Axis, y: &Axis, points: impl IntoIterator<Item = (f64, f64)>) -> String {
+pub(in crate::report) fn line(
+    x: &Axis,
+    y: &Axis,
+    points: impl IntoIterator<Item = (f64, f64)>,
+) -> String {
     let mut path = String::new();
     let mut last: Option<(i64, i64)> = None;
     let mut fresh = true;
@@ -47,7 +51,11 @@ pub(super) fn line(x: &Axis, y: &Axis, points: impl IntoIterator<Item = (f64, f6
 }
 
 /// Dots at the points: lines without length, which round caps make round at any scale.
-pub(super) fn dots(x: &Axis, y: &Axis, points: impl IntoIterator<Item = (f64, f64)>) -> String {
+pub(in crate::report) fn dots(
+    x: &Axis,
+    y: &Axis,
+    points: impl IntoIterator<Item = (f64, f64)>,
+) -> String {
     points
         .into_iter()
         .filter_map(|(at, value)| point(x, y, at, value))
@@ -56,7 +64,7 @@ pub(super) fn dots(x: &Axis, y: &Axis, points: impl IntoIterator<Item = (f64, f6
 }
 
 /// The area between two lines over the same places.
-pub(super) fn area(x: &Axis, y: &Axis, points: &[(f64, f64, f64)]) -> String {
+pub(in crate::report) fn area(x: &Axis, y: &Axis, points: &[(f64, f64, f64)]) -> String {
     let upper = points.iter().filter_map(|p| point(x, y, p.0, p.2));
     let lower = points.iter().rev().filter_map(|p| point(x, y, p.0, p.1));
     let mut path = String::new();

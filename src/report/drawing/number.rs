@@ -4,7 +4,7 @@
 const NONE: &str = "–";
 
 /// `value` with `digits` significant digits.
-pub(super) fn number(value: f64, digits: usize) -> String {
+pub(in crate::report) fn number(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return NONE.to_owned();
     }
@@ -21,7 +21,7 @@ pub(super) fn number(value: f64, digits: usize) -> String {
 }
 
 /// `value ± std`, to two digits of `std`; without a `std`, four digits of the value.
-pub(super) fn uncertain(value: f64, std: Option<f64>) -> String {
+pub(in crate::report) fn uncertain(value: f64, std: Option<f64>) -> String {
     let Some(std) = std.filter(|s| s.is_finite() && *s > 0.0 && value.is_finite()) else {
         return number(value, 4);
     };
@@ -41,7 +41,7 @@ pub(super) fn uncertain(value: f64, std: Option<f64>) -> String {
 }
 
 /// A share of one in per cent, `share` of 0.123 as `12.3 %`.
-pub(super) fn percent(share: f64, decimals: usize) -> String {
+pub(in crate::report) fn percent(share: f64, decimals: usize) -> String {
     if share.is_finite() {
         format!("{} %", fixed(100.0 * share, decimals))
     } else {
@@ -50,7 +50,7 @@ pub(super) fn percent(share: f64, decimals: usize) -> String {
 }
 
 /// A share of a variance in per cent, without claiming all or nothing of what is nearly so.
-pub(super) fn share(of: f64) -> String {
+pub(in crate::report) fn share(of: f64) -> String {
     match of {
         s if s > 0.999 && s < 1.0 => "> 99.9 %".to_owned(),
         s if s > 0.0 && s < 0.001 => "< 0.1 %".to_owned(),
@@ -59,7 +59,7 @@ pub(super) fn share(of: f64) -> String {
 }
 
 /// A probability in per cent; nothing is certain.
-pub(super) fn probability(of: f64) -> String {
+pub(in crate::report) fn probability(of: f64) -> String {
     match of {
         p if !p.is_finite() => NONE.to_owned(),
         p if p > 0.99 => "> 99 %".to_owned(),
@@ -69,13 +69,13 @@ pub(super) fn probability(of: f64) -> String {
 }
 
 /// A share of one as the width of a bar, in per cent.
-pub(super) fn width(share: f64) -> String {
+pub(in crate::report) fn width(share: f64) -> String {
     let share = if share.is_finite() { share } else { 0.0 };
     format!("{:.1}", 100.0 * share.clamp(0.0, 1.0))
 }
 
 /// The probability of as much by chance.
-pub(super) fn p_value(of: f64) -> String {
+pub(in crate::report) fn p_value(of: f64) -> String {
     match of {
         p if !p.is_finite() => NONE.to_owned(),
         p if p < 1e-4 => "< 0.0001".to_owned(),
@@ -84,7 +84,7 @@ pub(super) fn p_value(of: f64) -> String {
 }
 
 /// `value` with `decimals` digits after the point, and a minus sign that is one.
-pub(super) fn fixed(value: f64, decimals: usize) -> String {
+pub(in crate::report) fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return NONE.to_owned();
     }
@@ -97,7 +97,7 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
 }
 
 /// `10⁻⁶`.
-pub(super) fn power_of_ten(exponent: i32) -> String {
+pub(in crate::report) fn power_of_ten(exponent: i32) -> String {
     let digits = exponent.to_string();
     let raised = digits.chars().map(|c| match c {
         '-' => '⁻',
@@ -118,7 +118,7 @@ pub(super) fn power_of_ten(exponent: i32) -> String {
 }
 
 /// A number and its unit, with a space that does not break.
-pub(super) fn with_unit(number: &str, unit: &str) -> String {
+pub(in crate::report) fn with_unit(number: &str, unit: &str) -> String {
     if unit.is_empty() {
         number.to_owned()
     } else {
@@ -127,7 +127,7 @@ pub(super) fn with_unit(number: &str, unit: &str) -> String {
 }
 
 /// A number that is known exactly: no digits that say nothing.
-pub(super) fn exact(value: f64) -> String {
+pub(in crate::report) fn exact(value: f64) -> String {
     let text = number(value, 6);
     match text.split_once(" × ") {
         Some(_) => text,

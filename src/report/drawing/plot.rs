@@ -8,56 +8,58 @@ use super::trace::{area, dots, line};
 
 /// Pictures that share their horizontal axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Group {
+pub(in crate::report) struct Group {
     /// Unique within the page.
-    pub(super) id: String,
+    pub(in crate::report) id: String,
     /// Heading.
-    pub(super) title: String,
+    pub(in crate::report) title: String,
     /// What there is to see.
-    pub(super) caption: String,
+    pub(in crate::report) caption: String,
     /// From top to bottom.
-    pub(super) plots: Vec<Plot>,
+    pub(in crate::report) plots: Vec<Plot>,
     /// Shown only when asked for.
-    pub(super) folded: bool,
+    pub(in crate::report) folded: bool,
 }
 
 /// One picture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Plot {
+pub(in crate::report) struct Plot {
     /// Heading.
-    pub(super) title: String,
+    pub(in crate::report) title: String,
     /// What it shows, in a sentence.
-    pub(super) description: String,
-    pub(super) x: AxisView,
-    pub(super) y: AxisView,
-    pub(super) series: Vec<Series>,
-    pub(super) shades: Vec<Shade>,
+    pub(in crate::report) description: String,
+    pub(in crate::report) x: AxisView,
+    pub(in crate::report) y: AxisView,
+    pub(in crate::report) series: Vec<Series>,
+    pub(in crate::report) shades: Vec<Shade>,
     /// Intervals that are marked along the upper edge.
-    pub(super) strips: Vec<Shade>,
+    pub(in crate::report) strips: Vec<Shade>,
     /// Name and height range of a band from left to right.
-    pub(super) stripe: Option<Stripe>,
+    pub(in crate::report) stripe: Option<Stripe>,
     /// Class: how high it is.
-    pub(super) height: &'static str,
+    pub(in crate::report) height: &'static str,
     /// Keeps the vertical range of the other pictures of its group.
-    pub(super) same_scale: bool,
+    pub(in crate::report) same_scale: bool,
     /// Its range comes from a picture above, and its own may be much smaller.
-    pub(super) follows: bool,
+    pub(in crate::report) follows: bool,
 }
 
 /// A line in a picture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Series {
-    pub(super) name: String,
+pub(in crate::report) struct Series {
+    pub(in crate::report) name: String,
     /// Class in the style sheet: colour, width and dashes.
-    pub(super) class: &'static str,
-    pub(super) path: String,
+    pub(in crate::report) class: &'static str,
+    pub(in crate::report) path: String,
     /// Area around the line.
-    pub(super) area: Option<String>,
+    pub(in crate::report) area: Option<String>,
+    /// A bundle of lines, of which no single value is read.
+    pub(in crate::report) quiet: bool,
 }
 
 /// An interval along the horizontal axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Shade {
+pub(in crate::report) struct Shade {
     /// In the picture's coordinates.
     from: String,
     width: String,
@@ -70,7 +72,7 @@ pub(super) struct Shade {
 
 /// A band along the vertical axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Stripe {
+pub(in crate::report) struct Stripe {
     from: String,
     height: String,
     name: &'static str,
@@ -78,7 +80,7 @@ pub(super) struct Stripe {
 
 impl Series {
     /// A line.
-    pub(super) fn line(
+    pub(in crate::report) fn line(
         name: impl Into<String>,
         class: &'static str,
         axes: (&Axis, &Axis),
@@ -89,11 +91,42 @@ impl Series {
             class,
             path: line(axes.0, axes.1, points),
             area: None,
+            quiet: false,
         }
     }
 
+    /// A bundle of lines of one kind, each of them drawn from its own beginning.
+    pub(in crate::report) fn bundle(
+        name: impl Into<String>,
+        class: &'static str,
+        axes: (&Axis, &Axis),
+        lines: impl IntoIterator<Item = Vec<(f64, f64)>>,
+    ) -> Self {
+        let paths: Vec<String> = lines
+            .into_iter()
+            .map(|points| line(axes.0, axes.1, points))
+            .collect();
+        Self {
+            name: name.into(),
+            class,
+            quiet: paths.len() > 1,
+            path: paths.concat(),
+            area: None,
+        }
+    }
+
+    /// The same with an area: `(at, lower, upper)`.
+    pub(in crate::report) fn within(
+        mut self,
+        axes: (&Axis, &Axis),
+        limits: &[(f64, f64, f64)],
+    ) -> Self {
+        self.area = Some(area(axes.0, axes.1, limits));
+        self
+    }
+
     /// Dots within an area: `(at, value, deviation)`.
-    pub(super) fn dots_within(
+    pub(in crate::report) fn dots_within(
         name: impl Into<String>,
         class: &'static str,
         axes: (&Axis, &Axis),
@@ -105,13 +138,20 @@ impl Series {
             class,
             path: dots(axes.0, axes.1, points.iter().map(|p| (p.0, p.1))),
             area: Some(area(axes.0, axes.1, &around)),
+            quiet: false,
         }
     }
 }
 
 impl Shade {
     /// An interval cut to the axis; `None` outside of it.
-    pub(super) fn new(x: &Axis, from: f64, to: f64, label: String, title: String) -> Option<Self> {
+    pub(in crate::report) fn new(
+        x: &Axis,
+        from: f64,
+        to: f64,
+        label: String,
+        title: String,
+    ) -> Option<Self> {
         let (a, b) = x.cut(from, to)?;
         Some(Self {
             from: fixed_plain(SIZE * a),
@@ -125,7 +165,7 @@ impl Shade {
 
 impl Stripe {
     /// A band from `-half` to `half`.
-    pub(super) fn around_zero(y: &Axis, half: f64, name: &'static str) -> Option<Self> {
+    pub(in crate::report) fn around_zero(y: &Axis, half: f64, name: &'static str) -> Option<Self> {
         let (a, b) = y.cut(-half, half)?;
         (half.is_finite() && half > 0.0).then(|| Self {
             from: fixed_plain(SIZE * (1.0 - b)),
@@ -140,7 +180,7 @@ fn fixed_plain(value: f64) -> String {
 }
 
 /// `12.0 – 20.5 s`, with as many digits as tell the two apart.
-pub(super) fn interval(from: f64, to: f64, unit: &str) -> String {
+pub(in crate::report) fn interval(from: f64, to: f64, unit: &str) -> String {
     let width = (to - from).abs();
     let decimals = match width {
         w if !w.is_finite() || w <= 0.0 => 2.0,

@@ -53,12 +53,13 @@
       [this.xScale, this.yScale] = pair(data.exponents).map((e) => 10 ** e);
       this.units = data.units.split("|");
       this.log = "log" in data;
+      this.logY = "logY" in data;
       this.same = "same" in data;
       const keys = element.querySelectorAll("button.key:not(.own)");
       this.series = [...element.querySelectorAll(".series")].map((line, k) => {
         const place = (p) => [this.toX(p[0]), this.toY(p[1])];
         const read = (part) => points(part.getAttribute("d")).map(place);
-        return { line, key: keys[k], on: true, points: read(line.querySelector(".line")),
+        return { line, key: keys[k], on: true, quiet: "quiet" in line.dataset, points: read(line.querySelector(".line")),
           around: [...line.querySelectorAll(".around")].flatMap(read) };
       });
     }
@@ -102,21 +103,29 @@
         mark.style.top = `${0.25 + 1.45 * row}rem`;
       }
       const { width, height } = this.area.getBoundingClientRect();
-      this.ticks(".ticks.y", linear(y[0] / this.yScale, y[1] / this.yScale, Math.max(4, height / 46)), "top",
-        (v) => 1 - (v * this.yScale - y[0]) / (y[1] - y[0]));
-      const across = this.xTicks(x, Math.max(4, width / 95));
+      const up = this.ticksOf(y, Math.max(4, height / 46), this.logY, this.yScale);
+      this.ticks(".ticks.y", up, "top", (v) => 1 - (v - y[0]) / (y[1] - y[0]));
+      const across = this.ticksOf(x, Math.max(4, width / 95), this.log, this.xScale);
       this.ticks(".ticks.x", across, "left", (v) => (v - x[0]) / (x[1] - x[0]));
     }
-    xTicks(x, count) {
-      if (!this.log) return linear(x[0] / this.xScale, x[1] / this.xScale, count).map(([v, t]) => [v * this.xScale, t]);
-      const label = (v) => (v >= 1e-3 && v < 1e5 ? text(v, Math.max(0, -Math.floor(Math.log10(v * 1.000001)))) : v.toExponential(0));
-      if (x[1] - x[0] < 0.8) return linear(10 ** x[0], 10 ** x[1], count).filter(([v]) => v > 0).map(([v, t]) => [Math.log10(v), t]);
-      const steps = (x[1] - x[0]) * 3 > 1.6 * count ? [1] : [1, 2, 5];
+    // Ticks of an axis: [place, label].
+    ticksOf(range, count, log, scale) {
+      if (!log) return linear(range[0] / scale, range[1] / scale, count).map(([v, t]) => [v * scale, t]);
+      const raised = (d) => `10${[...`${d}`].map((c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]).join("")}`;
+      const label = (m, d) => {
+        if (d >= -3 && d < 5) return text(m * 10 ** d, Math.max(0, -d));
+        return m === 1 ? raised(d) : `${m} × ${raised(d)}`;
+      };
+      const decades = range[1] - range[0];
+      if (decades < 0.8) return linear(10 ** range[0], 10 ** range[1], count).filter(([v]) => v > 0).map(([v, t]) => [Math.log10(v), t]);
+      const steps = decades * 3 > 1.6 * count ? [1] : [1, 2, 5];
+      const every = steps.length > 1 ? 1 : Math.max(1, Math.ceil(decades / count));
       const ticks = [];
-      for (let d = Math.floor(x[0]); d <= x[1]; d += 1) {
+      for (let d = Math.floor(range[0]); d <= range[1]; d += 1) {
+        if (d % every) continue;
         for (const m of steps) {
           const at = d + Math.log10(m);
-          if (at >= x[0] && at <= x[1]) ticks.push([at, label(m * 10 ** d)]);
+          if (at >= range[0] && at <= range[1]) ticks.push([at, label(m, d)]);
         }
       }
       return ticks;
@@ -133,7 +142,7 @@
     // Values at the sample nearest to a place.
     read(at) {
       const cursor = this.area.querySelector(".cursor"), readout = this.area.querySelector(".readout");
-      const near = this.series.filter((s) => s.on && s.points.length).map((s) => {
+      const near = this.series.filter((s) => s.on && !s.quiet && s.points.length).map((s) => {
         const best = s.points.reduce((p, q) => (Math.abs(q[0] - at) < Math.abs(p[0] - at) ? q : p));
         return [s.key.textContent.trim(), best];
       });
@@ -144,7 +153,7 @@
       const digits = (range, scale) => clamp(Math.ceil(-Math.log10((range[1] - range[0]) / scale)) + 3, 0, 12);
       const place = this.log ? (10 ** x).toPrecision(4) : text(x / this.xScale, digits(this.viewX, this.xScale));
       const lines = [[`${place} ${this.units[0]}`, ""], ...near.map(([name, p]) =>
-        [name, `${text(p[1] / this.yScale, digits(this.viewY, this.yScale))} ${this.units[1]}`])];
+        [name, `${this.logY ? (10 ** p[1]).toPrecision(3) : text(p[1] / this.yScale, digits(this.viewY, this.yScale))} ${this.units[1]}`])];
       readout.replaceChildren(...lines.map(([name, value]) => {
         const row = document.createElement("span");
         row.append(Object.assign(document.createElement("span"), { textContent: name }),

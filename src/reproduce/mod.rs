@@ -1,0 +1,108 @@
+//! The papers' experiments, run again: their tables and figures beside what they print.
+//!
+//! ```
+//! use innovant::reproduce::{Study, experiment};
+//!
+//! let study = Study { runs: Some(8), seed: 1, progress: &|| {} };
+//! let example = experiment("van-wingerden-1").ok_or("unknown")?;
+//! let found = example.reproduce(&study)?;
+//! for row in &found.comparison {
+//!     println!("{}: {} / {}: {}", row.place, row.paper, row.here, row.agreement.words());
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! An [`Experiment`] carries out a Monte Carlo study and delivers a [`Reproduction`]: comparison with the paper,
+//! pictures and tables as numbers. JSON, CSV, terminal and page are written from that one document, by
+//! [`report`](crate::report). Errors in print are found by computing what is printed, not by claiming it.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `document`, `figure` | what a reproduction delivers |
+//! | `study` | runs in parallel; each has its own seed, so that results depend neither on threads nor on their number |
+//! | `statistics`, `words` | percentiles and moments over runs; numbers in sentences |
+//! | `data` | the data factor of a simulated recording |
+//! | `van_wingerden` | van Wingerden: both examples |
+//! | `chiuso_picci` | Chiuso & Picci: both examples |
+//! | `knudsen` | Knudsen: all three systems |
+
+mod chiuso_picci;
+mod data;
+mod document;
+mod error;
+mod figure;
+mod knudsen;
+mod statistics;
+mod study;
+mod van_wingerden;
+mod words;
+
+pub use chiuso_picci::{ChiusoPicciOne, ChiusoPicciTwo};
+pub use document::{Agreement, Comparison, Fact, Origin, REPRODUCTION_FORMAT, Reproduction};
+pub use error::ReproduceError;
+pub use figure::{BarSeries, Bars, Curve, Figure, Panel, Quantity, Role, Row, Table};
+pub use knudsen::{KnudsenExperiment, knudsen_experiments};
+pub use study::{LEAST_RUNS, Study, on_threads};
+pub use van_wingerden::{VanWingerdenOne, VanWingerdenTwo};
+
+/// An experiment of a paper.
+pub trait Experiment: Sync {
+    /// Its name on the command line.
+    fn name(&self) -> &'static str;
+
+    /// What it shows.
+    fn title(&self) -> &'static str;
+
+    /// Number of Monte Carlo runs in the paper.
+    fn paper_runs(&self) -> usize;
+
+    /// How often [`Study::progress`] is called when there are `runs` runs: the number of systems times that.
+    fn runs_of(&self, runs: usize) -> usize {
+        runs
+    }
+
+    /// Carries it out.
+    ///
+    /// # Errors
+    /// [`ReproduceError`]: too few runs, or a method that fails in too many of them.
+    fn reproduce(&self, study: &Study) -> Result<Reproduction, ReproduceError>;
+}
+
+/// All experiments, in the order of the papers.
+pub fn experiments() -> Vec<&'static dyn Experiment> {
+    let mut all: Vec<&'static dyn Experiment> = vec![
+        &VanWingerdenOne,
+        &VanWingerdenTwo,
+        &ChiusoPicciOne,
+        &ChiusoPicciTwo,
+    ];
+    for experiment in knudsen_experiments() {
+        all.push(experiment);
+    }
+    all
+}
+
+/// The experiment of that name.
+pub fn experiment(name: &str) -> Option<&'static dyn Experiment> {
+    experiments().into_iter().find(|e| e.name() == name)
+}
+
+/// A document with its head filled in.
+fn document_of(of: &dyn Experiment, paper: &str, runs: usize, study: &Study) -> Reproduction {
+    Reproduction {
+        format: REPRODUCTION_FORMAT.to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        experiment: of.name().to_owned(),
+        title: of.title().to_owned(),
+        paper: paper.to_owned(),
+        runs,
+        paper_runs: of.paper_runs(),
+        seed: study.seed,
+        setup: Vec::new(),
+        comparison: Vec::new(),
+        figures: Vec::new(),
+        bars: Vec::new(),
+        tables: Vec::new(),
+        remarks: Vec::new(),
+    }
+}
