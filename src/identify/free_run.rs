@@ -177,7 +177,9 @@ fn free_runs(
         records.read(experiment, Some(limit), &mut |columns| {
             aligner.push(columns, &mut |columns| {
                 let samples = columns.first().map_or(0, |c| c.len());
-                for k in 0..samples {
+                let first = at;
+                while at < first + samples {
+                    let k = at - first;
                     let value = |c: usize| (columns[c][k] - trend.at(c, at)) / data.scale[c];
                     let u = DVector::from_fn(inputs, |j, _| value(j));
                     for (((_, system, _), x), e) in systems.iter().zip(&mut states).zip(&mut errors)
