@@ -169,7 +169,10 @@ fn free_runs(
         let mut aligner = Aligner::new(data.delays(), outputs);
         records.read(experiment, Some(limit), &mut |columns| {
             aligner.push(columns, &mut |columns| {
-                for k in 0..columns[0].len() {
+                let samples = columns.first().map_or(0, |c| c.len());
+                let first = at;
+                while at < first + samples {
+                    let k = at - first;
                     let value = |c: usize| (columns[c][k] - trend.at(c, at)) / data.scale[c];
                     let u = DVector::from_fn(inputs, |j, _| value(j));
                     for (((_, system, _), x), e) in systems.iter().zip(&mut states).zip(&mut errors)

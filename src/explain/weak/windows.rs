@@ -170,10 +170,15 @@ impl Motion {
         for segment in &data.segments {
             let y = &segment.outputs[0];
             let n = y.len();
-            let mut v: Vec<f64> = vec![0.0; n];
-            for k in reach..n.saturating_sub(reach) {
-                v[k] = averaged(&weights, y, k);
-            }
+            let mut v: Vec<f64> = (0..n)
+                .map(|k| {
+                    if k >= reach && k + reach < n {
+                        averaged(&weights, y, k)
+                    } else {
+                        0.0
+                    }
+                })
+                .collect();
             for k in 0..reach.min(n) {
                 v[k] = v[reach.min(n - 1)];
                 v[n - 1 - k] = v[n.saturating_sub(1 + reach)];
