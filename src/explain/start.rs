@@ -118,9 +118,12 @@ fn deviation(y: &[f64]) -> f64 {
         .max(1e-12)
 }
 
+/// Scaled errors of the outputs from an initial state.
+type Errors<'a> = dyn Fn(&DVector<f64>) -> Result<DVector<f64>, AugmentedError> + 'a;
+
 /// Levenberg and Marquardt from `x` on: the state and its cost.
 fn climb(
-    error: &dyn Fn(&DVector<f64>) -> Result<DVector<f64>, AugmentedError>,
+    error: &Errors,
     prior: &Prior,
     mut x: DVector<f64>,
 ) -> Result<(DVector<f64>, f64), AugmentedError> {
