@@ -22,7 +22,7 @@ pub(crate) const SHARE: f64 = 0.03;
 
 /// Structure that is left counts as imperfection of a law that is right in kind, while it is below this share of what
 /// the law has explained: the textbook form of a law is rarely closer to a real one than some thousandths.
-const OF_REMOVED: f64 = 0.005;
+const OF_REMOVED: f64 = 0.0075;
 /// The same for dry friction, whose textbook laws leave out bristles, lubricant and dwell time (Armstrong-Helouvry,
 /// Dupont and Canudas de Wit 1994).
 const OF_REMOVED_BY_FRICTION: f64 = 0.02;

@@ -30,6 +30,10 @@ pub struct Options {
     pub seed: u64,
 }
 
+/// A free-run fit always follows its own recording better than an averaged equation does; by this factor it has found
+/// what the equation lacks.
+const MUCH_BETTER: f64 = 0.5;
+
 /// Points of a trace in the document, at most.
 const TRACE_POINTS: usize = 1500;
 
@@ -49,20 +53,33 @@ pub fn explain(
     }
     let known = know(recordings, simulation)?;
     let allowed = |d: &Definition| !options.without.iter().any(|id| id == d.id);
-    if let Some((known, finding, mask)) = weak::attempt(recordings, &known, &allowed) {
-        return Ok(Answer {
-            recordings,
-            known: &known,
-            finding: &finding,
-            mask,
-            seed: options.seed,
+    let drive = weak::attempt(recordings, &known, &allowed);
+    // Where a free run drifts there is no other way, and what leaves nothing needs none; else it may tell more.
+    let settled = drive.as_ref().is_some_and(|(_, finding, _)| {
+        finding.weak.as_ref().is_some_and(|proof| proof.drifts())
+            || finding
+                .adequacy
+                .is_none_or(|a| a.p_value > super::adequacy::LEVEL)
+    });
+    let ordinary = (!settled)
+        .then(|| inquire(&known.data, &known.structure, &allowed))
+        .flatten();
+    let (known, finding, mask) = match (drive, ordinary) {
+        (Some((_, averaged, _)), Some((finding, mask)))
+            if finding.verdict != Verdict::Unexplained
+                && finding.free_run_error(&known.data)
+                    < MUCH_BETTER * averaged.free_run_error(&known.data) =>
+        {
+            (known, finding, mask)
         }
-        .say());
-    }
-    let (finding, mask) =
-        inquire(&known.data, &known.structure, &allowed).ok_or_else(|| ExplainError::NoFit {
-            name: recordings[0].name.clone(),
-        })?;
+        (Some(drive), _) => drive,
+        (None, Some((finding, mask))) => (known, finding, mask),
+        (None, None) => {
+            return Err(ExplainError::NoFit {
+                name: recordings[0].name.clone(),
+            });
+        }
+    };
     Ok(Answer {
         recordings,
         known: &known,

@@ -6,7 +6,7 @@ use super::effects::{self, Definition, Unit};
 use super::exact::{Freeze, frozen, spacing};
 use super::explanation::Verdict;
 use super::fit::{Effort, Fit, Problem};
-use super::plausible::{add_free_twins, plant_may_stay, pulls, sane};
+use super::plausible::{add_free_twins, plant_may_stay, pulls, reaches, sane};
 use super::refine::{FURTHER, REFINEMENTS, decides_within, derived, finer_steps};
 use super::search::{Boring, Ranked, single_effects};
 use super::second::{heldout_gain, pair, with_feedthrough};
@@ -63,6 +63,20 @@ pub(crate) struct Finding {
     pub detectable: Vec<(&'static Definition, super::structure::Instance, f64)>,
     /// What was decided by the averaged equation of motion.
     pub weak: Option<Box<super::weak::Proof>>,
+}
+
+impl Finding {
+    /// Root mean square error of the model that stands, over the standard deviations of the outputs in `data`.
+    pub fn free_run_error(&self, data: &Data) -> f64 {
+        let scale = data.output_scale();
+        let (mut sum, mut n) = (0.0, 0usize);
+        for (series, e) in self.model.residual.iter().enumerate() {
+            let scale = scale[series % scale.len()];
+            sum += e.iter().map(|e| (e / scale).powi(2)).sum::<f64>();
+            n += e.len();
+        }
+        (sum / n.max(1) as f64).sqrt()
+    }
 }
 
 /// Runs the whole inquiry. `structure` is the simulation as it is known.
@@ -161,9 +175,7 @@ pub(crate) fn inquire(
             && (gain > BEYOND_DOUBT
                 || heldout_gain(&problem, before, &r.fit)
                     .is_some_and(|held| held > least_heldout(expected)))
-            // Beside the plant as given it wins by fewer numbers; it must explain as much as other parameters do, or
-            // it stands for them (math/explain.md, choice 5).
-            && (r.fit.structure.plant_free || r.fit.deviance < finding.boring.full.deviance)
+            && reaches(&r.fit, &finding.boring.full)
     });
     if let Some(best) = best {
         // A plant of another class has been searched with everything that comes with it, and to the end.

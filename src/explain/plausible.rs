@@ -13,6 +13,9 @@ use super::structure::Signal;
 /// Probability of a larger difference when the plant is as it was given.
 const SAME_PLANT: f64 = 1e-3;
 
+/// Probability of a larger shortfall against free parameters when the effect is the truth.
+const SHORT_OF_FULL: f64 = 0.05;
+
 /// Share of the samples that a threshold must leave on either side of it.
 const VISITED: f64 = 0.002;
 
@@ -74,6 +77,17 @@ pub(crate) fn plant_may_stay(ranked: &Ranked, all: &[Ranked]) -> bool {
             let gained = ranked.fit.deviance - other.fit.deviance;
             ChiSquared::new(more as f64).map_or(true, |d| d.sf(gained.max(0.0)) > SAME_PLANT)
         })
+}
+
+/// Whether an effect beside the plant as given explains as much as other parameters do: it wins by fewer numbers, and
+/// where those explain significantly more it stands for them (math/explain.md, choice 5).
+pub(crate) fn reaches(fit: &Fit, full: &Fit) -> bool {
+    if fit.structure.plant_free {
+        return true;
+    }
+    let more = full.free.saturating_sub(fit.free).max(1);
+    let short = fit.deviance - full.deviance;
+    ChiSquared::new(more as f64).map_or(true, |d| d.sf(short.max(0.0)) > SHORT_OF_FULL)
 }
 
 /// Fits with the plant free for the best that stand beside the given plant only, so that they can be compared.

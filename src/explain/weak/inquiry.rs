@@ -62,6 +62,13 @@ pub(crate) struct Proof {
     pub half: usize,
 }
 
+impl Proof {
+    /// Whether any error of a free run adds up: the position of a mass is measured.
+    pub fn drifts(&self) -> bool {
+        self.equation.reading == Reading::Position
+    }
+}
+
 /// The data whole (not cut to a stretch), with the constant as second input.
 fn whole(recordings: &[Log]) -> Data {
     Data {
