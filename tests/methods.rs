@@ -213,16 +213,16 @@ fn stochastic_step_goes_with_any_method() {
         let ratios: Vec<f64> = (0..60_u64)
             .into_par_iter()
             .map(|seed| {
-                let log = plant.record(2000, 700 + seed);
+                let log = plant.record(10_000, 700 + seed);
                 let own = identify(std::slice::from_ref(&log), &options(None)).unwrap();
                 let step = Some(Stochastic::Innovations);
                 let model = identify(&[log], &options(step)).unwrap();
                 assert_eq!(own.system.a, model.system.a);
                 assert_ne!(own.system.k, model.system.k);
                 let covariance = model.covariance.as_ref().unwrap();
-                let spread = noise_response_covariance(&model.system, covariance, 0.785).unwrap();
-                let truth = plant.system.noise_response(0.785);
-                let found = model.system.noise_response(0.785);
+                let spread = noise_response_covariance(&model.system, covariance, 1.5).unwrap();
+                let truth = plant.system.noise_response(1.5);
+                let found = model.system.noise_response(1.5);
                 let square: f64 = (0..4).map(|i| (found[i] - truth[i]).norm_sqr()).sum();
                 square / spread.iter().map(|c| c[0][0] + c[1][1]).sum::<f64>()
             })
@@ -232,6 +232,7 @@ fn stochastic_step_goes_with_any_method() {
             "{}: squared error of the noise response over variance {mean:.2}",
             method.name()
         );
-        assert!((0.6..1.5).contains(&mean), "{method:?}: {mean}");
+        // Standard error of a mean of 60 with a few degrees of freedom each: about 0.12.
+        assert!((0.65..1.4).contains(&mean), "{method:?}: {mean}");
     }
 }

@@ -56,23 +56,29 @@ pub fn asymptotic_covariance(
     let solve = |right: &DMatrix<f64>| {
         solve_upper(&past_factor, &solve_upper_transposed(&past_factor, right))
     };
-    let coefficients = solve(
-        &window
-            .view((0, width + inputs), (width, outputs))
-            .into_owned(),
-    );
     let state_map = state_map(closed_loop, method, weight, future)?;
-    let state_of_past = match method {
-        AsymptoticMethod::Nested(_) => solve(&moments.past_with_state(past, n)).transpose(),
-        // The state of PBSID_opt comes from the vector ARX model, shifted: van Wingerden (25).
+    // State and prediction of the output as functions of the past window.
+    let (state_of_past, coefficients) = match method {
+        AsymptoticMethod::Nested(_) => {
+            let outputs_of_past = window.view((0, width + inputs), (width, outputs));
+            (
+                solve(&moments.past_with_state(past, n)).transpose(),
+                solve(&outputs_of_past.into_owned()),
+            )
+        }
+        // The paper's assumption (A - K C)^p = 0: van Wingerden (20)-(22).
         AsymptoticMethod::PbsidOpt => {
-            let mut stacked = DMatrix::zeros(future * outputs, width);
-            for i in 0..future.min(past) {
-                stacked
-                    .view_mut((i * outputs, i * q), (outputs, width - i * q))
-                    .copy_from(&coefficients.transpose().columns(0, width - i * q));
+            let predictor = &plant.a - &plant.k * &plant.c;
+            let mut column = DMatrix::zeros(n, q);
+            column.columns_mut(0, inputs).copy_from(&plant.b);
+            column.columns_mut(inputs, outputs).copy_from(&plant.k);
+            let mut state = DMatrix::zeros(n, width);
+            for block in (0..past).rev() {
+                state.columns_mut(block * q, q).copy_from(&column);
+                column = &predictor * column;
             }
-            multiply(&state_map, &stacked)
+            let coefficients = (&plant.c * &state).transpose();
+            (state, coefficients)
         }
     };
 
