@@ -37,8 +37,6 @@ pub(crate) struct Losses {
     /// Both rims.
     pub overflow: f64,
     pub upper_overflow: f64,
-    pub lower_overflow: f64,
-    pub constant_inflow: f64,
     /// Not a part, but which tank is which: the same class with the slower tank at the other place. Small where both
     /// answers explain the recordings; infinite where there is no second one.
     pub exchange: f64,
@@ -57,19 +55,12 @@ pub(crate) struct CascadeFit {
     pub deviations: [f64; NUMBERS],
     /// Levels at the first sample of each record.
     pub initial: Vec<[f64; 2]>,
-    pub simulated: Vec<Vec<f64>>,
-    /// Measured minus simulated.
-    pub residual: Vec<Vec<f64>>,
     /// Root mean square of the residual over the samples that count.
     pub error: f64,
     /// Samples that count.
     pub count: usize,
-    /// Independent samples that would say as much.
-    pub effective: f64,
     /// Free numbers, the initial levels of each record among them.
     pub free: usize,
-    /// `count ln(error^2) + free ln(count)`, in units of the output.
-    pub criterion: f64,
     pub losses: Losses,
 }
 
@@ -199,8 +190,6 @@ fn select(problem: &Problem, pump_bias: bool) -> Option<(Trial, Losses)> {
         outflow: least(&|_| true, &linear) - own,
         overflow: least(&|p| !p.upper_overflow && !p.lower_overflow, &fits) - own,
         upper_overflow: least(&|p| !p.upper_overflow, &fits) - own,
-        lower_overflow: least(&|p| !p.lower_overflow, &fits) - own,
-        constant_inflow: least(&|p| !p.constant_inflow, &fits) - own,
         exchange: exchanged(problem, &best).map_or(f64::INFINITY, |t| criterion(problem, &t)) - own,
     };
     Some((best, losses))
@@ -292,13 +281,9 @@ impl CascadeFit {
             cascade,
             deviations,
             initial,
-            simulated,
-            residual,
             error,
             count: problem.count,
-            effective,
             free: best.free(),
-            criterion: criterion(problem, &best) + n * 2.0 * units.1.ln(),
             losses,
         }
     }
