@@ -139,7 +139,7 @@ fn simulations_with_other_channels() {
     );
     says(
         &about(&folder, &["two.csv"], &["simulated.csv"], &[]),
-        &["simulated.csv: 1 simulated outputs", "two.csv has 2"],
+        &["simulated.csv: 1 simulated output,", "two.csv has 2"],
     );
     folder.text("others.csv", &two.replace("y1,y2", "y3,y4"));
     says(

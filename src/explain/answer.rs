@@ -34,6 +34,9 @@ pub struct Options {
 /// what the equation lacks.
 const MUCH_BETTER: f64 = 0.5;
 
+/// What an averaged equation leaves is mostly noise below this share of structure.
+const MOSTLY_NOISE: f64 = 0.5;
+
 /// Points of a trace in the document, at most.
 const TRACE_POINTS: usize = 1500;
 
@@ -54,21 +57,18 @@ pub fn explain(
     let known = know(recordings, simulation)?;
     let allowed = |d: &Definition| !options.without.iter().any(|id| id == d.id);
     let drive = weak::attempt(recordings, &known, &allowed);
-    // Where a free run drifts there is no other way, and what leaves nothing needs none; else it may tell more.
+    // What the averaged equation explains to noise needs no other way.
     let settled = drive.as_ref().is_some_and(|(_, finding, _)| {
-        finding.weak.as_ref().is_some_and(|proof| proof.drifts())
-            || finding
-                .adequacy
-                .is_none_or(|a| a.p_value > super::adequacy::LEVEL)
+        finding
+            .adequacy
+            .is_none_or(|a| a.p_value > super::adequacy::LEVEL || a.share < MOSTLY_NOISE)
     });
     let ordinary = (!settled)
         .then(|| inquire(&known.data, &known.structure, &allowed))
         .flatten();
     let (known, finding, mask) = match (drive, ordinary) {
         (Some((_, averaged, _)), Some((finding, mask)))
-            if finding.verdict != Verdict::Unexplained
-                && finding.free_run_error(&known.data)
-                    < MUCH_BETTER * averaged.free_run_error(&known.data) =>
+            if tells_more(&finding, &averaged, &known.data) =>
         {
             (known, finding, mask)
         }
@@ -88,6 +88,23 @@ pub fn explain(
         seed: options.seed,
     }
     .say())
+}
+
+/// Whether a free-run fit tells more of a drive than its averaged equation, which leaves structure.
+fn tells_more(free_run: &Finding, averaged: &Finding, data: &Data) -> bool {
+    // Where a free run drifts, a trend stands for whatever it misses.
+    let trend = free_run.model.structure.new_effects().iter().any(|e| {
+        matches!(
+            e.definition.id,
+            "sensor_drift" | "sensor_offset" | "load_step" | "periodic_disturbance"
+        )
+    });
+    if trend && averaged.weak.as_ref().is_some_and(|proof| proof.drifts()) {
+        return false;
+    }
+    averaged.verdict != Verdict::Named
+        || free_run.verdict != Verdict::Unexplained
+            && free_run.free_run_error(data) < MUCH_BETTER * averaged.free_run_error(data)
 }
 
 pub(crate) struct Answer<'a> {
