@@ -60,7 +60,7 @@ struct ModelFlags {
     /// Past window in samples: auto or P
     #[arg(long, default_value = "auto", value_parser = numbers::window, allow_negative_numbers = true)]
     past: Window,
-    /// Future window in samples, at most the past one: auto or F
+    /// Future window in samples (for pbsid-opt at most the past one): auto or F
     #[arg(long, default_value = "auto", value_parser = numbers::window, allow_negative_numbers = true)]
     future: Window,
     /// Algorithm
