@@ -58,6 +58,11 @@ impl Adequacy {
             }
     }
 
+    /// What the structure that is left is worth in a likelihood of `count` values.
+    pub fn gain(&self, count: usize) -> f64 {
+        -(count as f64) * (-self.share.min(0.999_999)).ln_1p()
+    }
+
     /// The same for a plant of another class than the linear one. What it removes is slow, and an autoregression of order
     /// one, under which this test is made, counts that for little; so it is measured as simulation error, whose mean
     /// square was `before` and is `now`.

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::data::{Data, Segment};
 use super::plant::Plant;
+use super::run::{Grid, run};
 use crate::linalg::{least_squares, svd_thin};
 use crate::model::StateSpace;
 
@@ -236,7 +237,8 @@ fn free_run(plant: &Plant, segment: &Segment, x0: &[f64]) -> Option<Vec<Vec<f64>
         step: plant.sample_time,
         fresh: false,
     };
-    super::run::run(plant, &[], x0, &segment.inputs, segment.samples(), &clock)
+    let grid = Grid::of_samples(segment.samples());
+    run(plant, &[], x0, &segment.inputs, grid, &clock)
 }
 
 /// Least squares over the whole segment, each output on its own scale; directions not seen stay zero.

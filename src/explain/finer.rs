@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use super::data::Series;
 use super::effects::Clock;
 use super::plant::{Plant, row_major};
-use super::run::{ActiveForce, run};
+use super::run::{ActiveForce, Grid, run};
 
 /// Steps a sample that a law is tried with; the error of a step falls with its square, so this takes out most of it.
 pub(crate) const STEPS: usize = 4;
@@ -55,29 +55,19 @@ impl Finer {
         samples: usize,
         clock: &Clock,
     ) -> Option<Series> {
-        let m = self.steps;
+        let steps = self.steps;
         let fine = Plant {
             a: row_major(&self.a),
             b: row_major(&(&self.share * plant.b_matrix())),
-            sample_time: plant.sample_time / m as f64,
+            sample_time: plant.sample_time / steps as f64,
             ..plant.clone()
         };
         let forces: Vec<ActiveForce> = forces.iter().map(|force| self.force(force)).collect();
-        let held: Vec<Vec<f64>> = inputs
-            .iter()
-            .map(|u| u.iter().flat_map(|u| std::iter::repeat_n(*u, m)).collect())
-            .collect();
         let clock = Clock {
-            step: clock.step / m as f64,
+            step: clock.step / steps as f64,
             ..*clock
         };
-        let outputs = run(&fine, &forces, x0, &held, samples * m, &clock)?;
-        Some(
-            outputs
-                .into_iter()
-                .map(|y| y.into_iter().step_by(m).collect())
-                .collect(),
-        )
+        run(&fine, &forces, x0, inputs, Grid { samples, steps }, &clock)
     }
 
     /// A force through its share of the direction.
@@ -121,7 +111,7 @@ mod tests {
             step: 0.01,
             fresh: false,
         };
-        let coarse = run(&plant, &[], &[0.3, -0.1], &input, 200, &clock).unwrap();
+        let coarse = run(&plant, &[], &[0.3, -0.1], &input, Grid::of_samples(200), &clock).unwrap();
         let finer = Finer::new(&plant, 4).unwrap();
         let fine = finer
             .run(&plant, &[], &[0.3, -0.1], &input, 200, &clock)

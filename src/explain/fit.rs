@@ -16,8 +16,8 @@ const STEP_SHARE: f64 = 1e-5;
 /// Steps stay between these, whatever the outputs do.
 const SMALLEST_STEP: f64 = 1e-30;
 const LARGEST_STEP: f64 = 1e30;
-/// Steps that are made with one set of derivatives before they are taken anew.
-const STEPS_EACH: usize = 2;
+/// Steps that are made with one set of derivatives, updated from what each step has shown, before they are taken anew.
+const STEPS_EACH: usize = 4;
 
 /// How hard a fit tries.
 #[derive(Debug, Clone, Copy)]
@@ -148,7 +148,7 @@ impl Fit {
         let noise = problem.noise(&residual);
         let deviance = noise.deviance(&residual, &problem.mask);
         let free = structure.len() + noise.len();
-        let steps = first_steps(&structure, &theta);
+        let steps = first_steps(&theta);
         Some(Self {
             structure,
             theta,
@@ -171,16 +171,20 @@ impl Fit {
         effort: Effort,
     ) -> Option<Self> {
         let mut fit = Self::at(problem, structure, theta)?;
-        if fit.theta.is_empty() {
-            return Some(fit);
-        }
+        fit.noise = match start {
+            Some(start) => start.clone(),
+            None => Noise::white(&fit.residual, problem.data.outputs, &problem.mask),
+        };
+        fit.improved(problem, effort)
+    }
+
+    /// The fit of all free numbers that begins with those of this one, and with its noise model.
+    pub fn improved(&self, problem: &Problem, effort: Effort) -> Option<Self> {
+        let mut fit = self.clone();
+        let rounds = if fit.theta.is_empty() { 1 } else { effort.rounds };
         let mut best: Option<Self> = None;
-        for round in 0..effort.rounds {
-            let noise = match (round, start) {
-                (0, Some(start)) => start.clone(),
-                (0, None) => Noise::white(&fit.residual, problem.data.outputs, &problem.mask),
-                _ => fit.noise.clone(),
-            };
+        for _ in 0..rounds {
+            let noise = fit.noise.clone();
             fit.descend(problem, &noise, effort);
             fit.noise = problem.noise(&fit.residual);
             fit.deviance = fit.noise.deviance(&fit.residual, &problem.mask);
@@ -220,6 +224,7 @@ impl Fit {
             };
             let system = derivatives.normal_equations(problem, noise, &self.residual, None);
             let mut gained = None;
+            let mut made = None;
             for _ in 0..if fresh { 8 } else { 1 } {
                 let Some(step) = system.step(damping) else {
                     damping *= 10.0;
@@ -237,8 +242,13 @@ impl Fit {
                     let now = noise.deviance(&residual, &problem.mask);
                     if now < cost {
                         gained = Some(cost - now);
+                        // A bound may have cut the step short.
+                        let moved = DVector::from_iterator(
+                            trial.len(),
+                            trial.iter().zip(&self.theta).map(|(t, was)| t - was),
+                        );
+                        made = Some((moved, std::mem::replace(&mut self.simulated, simulated)));
                         self.theta = trial;
-                        self.simulated = simulated;
                         self.residual = residual;
                         cost = now;
                         damping = (damping * 0.2).max(1e-9);
@@ -253,6 +263,9 @@ impl Fit {
                 }
             }
             age += 1;
+            if let (Some(derivatives), Some((step, before))) = (&mut jacobian, made) {
+                derivatives.update(problem, noise, &step, &before, &self.simulated);
+            }
             match gained {
                 Some(gained) if gained >= effort.settled => {}
                 // Little or nothing: the end with new derivatives, else a reason to take them anew.
@@ -388,6 +401,43 @@ struct Jacobian {
 }
 
 impl Jacobian {
+    /// Broyden's (1965) least change, each number on the scale of its own column, after which the derivatives foretell
+    /// what `step` has just done.
+    fn update(
+        &mut self,
+        problem: &Problem,
+        noise: &Noise,
+        step: &DVector<f64>,
+        before: &Series,
+        after: &Series,
+    ) {
+        let change: Series = after
+            .iter()
+            .zip(before)
+            .map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect())
+            .collect();
+        let missed: Vec<f64> = noise
+            .whiten(&change)
+            .iter()
+            .zip(&problem.mask)
+            .flat_map(|(v, mask)| v.iter().zip(mask).filter_map(|(v, keep)| keep.then_some(*v)))
+            .collect();
+        let step = DVector::from_iterator(self.used.len(), self.used.iter().map(|i| step[*i]));
+        let missed = DVector::from_vec(missed) - &self.columns * &step;
+        let along: Vec<f64> = self
+            .columns
+            .column_iter()
+            .zip(step.iter())
+            .map(|(column, s)| column.norm_squared() * s)
+            .collect();
+        let length: f64 = along.iter().zip(step.iter()).map(|(a, s)| a * s).sum();
+        if length > 0.0 && length.is_finite() {
+            for (mut column, a) in self.columns.column_iter_mut().zip(along) {
+                column.axpy(a / length, &missed, 1.0);
+            }
+        }
+    }
+
     /// The weighted least-squares system at `residual`, of all rows or of those that `only` lets pass.
     fn normal_equations(
         &self,
@@ -488,6 +538,6 @@ impl NormalEquations {
 }
 
 /// First guesses of the difference steps; they adapt.
-fn first_steps(_structure: &Structure, theta: &[f64]) -> Vec<f64> {
+fn first_steps(theta: &[f64]) -> Vec<f64> {
     theta.iter().map(|v| (v.abs() * 1e-5).max(1e-7)).collect()
 }

@@ -9,7 +9,7 @@ use super::fit::{Effort, Fit, Problem};
 use super::plausible::{add_free_twins, plant_may_stay, pulls, reaches, sane};
 use super::refine::{FURTHER, REFINEMENTS, decides_within, derived, finer_steps};
 use super::search::{Boring, Ranked, single_effects};
-use super::second::{heldout_gain, pair, with_feedthrough};
+use super::second::{self, heldout_gain, pair, with_feedthrough};
 use super::structure::Structure;
 
 /// Places, laws and starting values that are tried on one recording, about: a name among so many needs
@@ -194,9 +194,11 @@ pub(crate) fn inquire(
             });
         }
         let mut gain = base - fit.criterion(count);
-        // Where nothing is left there is no second effect to find.
-        let nothing_left = adequacy(&problem, &fit, &finding.boring.given, None)
-            .is_some_and(|a| a.p_value > NOTHING_LEFT);
+        // Where nothing is left, or less than a second effect must bring, there is none to find.
+        let left = adequacy(&problem, &fit, &finding.boring.given, None);
+        let nothing_left = left.is_some_and(|a| {
+            a.p_value > NOTHING_LEFT || a.gain(count) < second::required(gain)
+        });
         let second = if nothing_left || other_class {
             None
         } else {
@@ -360,13 +362,7 @@ fn rivals(ranked: &[Ranked], base: f64) -> Vec<Rival> {
 
 /// The fit tried harder.
 pub(crate) fn polished(problem: &Problem, fit: &Fit) -> Fit {
-    Fit::run(
-        problem,
-        fit.structure.clone(),
-        fit.theta.clone(),
-        Some(&fit.noise),
-        Effort::FINAL,
-    )
-    .filter(|better| better.deviance < fit.deviance)
-    .unwrap_or_else(|| fit.clone())
+    fit.improved(problem, Effort::FINAL)
+        .filter(|better| better.deviance < fit.deviance)
+        .unwrap_or_else(|| fit.clone())
 }

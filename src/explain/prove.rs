@@ -54,13 +54,7 @@ pub(crate) fn refit(problem: &Problem, fit: &Fit, train: &Mask) -> Option<Fit> {
         mask: train.clone(),
         ..problem.clone()
     };
-    Fit::run(
-        &without,
-        fit.structure.clone(),
-        fit.theta.clone(),
-        Some(&fit.noise),
-        Effort::RANK,
-    )
+    fit.improved(&without, Effort::RANK)
 }
 
 /// Fit figure of one output over the samples of `mask`.

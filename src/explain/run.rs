@@ -10,13 +10,26 @@ pub(crate) const MOST_STATES: usize = 12;
 /// knows no units; squares and products of such numbers still are numbers.
 const DIVERGED: f64 = 1e60;
 
+/// How finely the recursion runs.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Grid {
+    pub samples: usize,
+    /// Steps of the plant in a sample interval, over which the inputs are held.
+    pub steps: usize,
+}
+
+impl Grid {
+    /// One step a sample.
+    pub fn of_samples(samples: usize) -> Self {
+        Self { samples, steps: 1 }
+    }
+}
+
 /// A force made ready for one parameter vector.
 #[derive(Debug, Clone)]
 pub(crate) struct ActiveForce {
     pub law: ForceLaw,
     pub parameters: Vec<f64>,
-    /// The rate is needed; else it is not computed.
-    pub rate_matters: bool,
     pub position: Vec<f64>,
     pub rate: Vec<f64>,
     pub rate_feedthrough: Vec<f64>,
@@ -25,19 +38,20 @@ pub(crate) struct ActiveForce {
     pub input: usize,
 }
 
-/// Outputs of `plant` under `inputs` and `forces` from the state `x0`; `None` when they diverge.
+/// Outputs of `plant`, whose step is that of `grid` and of `clock`, at the samples, under `inputs` and `forces` from the
+/// state `x0`; `None` when they diverge.
 pub(crate) fn run(
     plant: &Plant,
     forces: &[ActiveForce],
     x0: &[f64],
     inputs: &[Vec<f64>],
-    samples: usize,
+    grid: Grid,
     clock: &Clock,
 ) -> Option<Series> {
     macro_rules! dispatch {
         ($($n:literal)*) => {
             match plant.states {
-                $($n => sized::<$n>(plant, forces, x0, inputs, samples, clock),)*
+                $($n => sized::<$n>(plant, forces, x0, inputs, grid, clock),)*
                 _ => None,
             }
         };
@@ -52,6 +66,9 @@ struct SizedForce<'a, const N: usize> {
     direction: [f64; N],
     position_gain: f64,
     memory: [f64; 3],
+    /// What the inputs of the sample add to the rate, and the one that the force is matched with.
+    rate_input: f64,
+    input: f64,
 }
 
 fn array<const N: usize>(values: &[f64]) -> [f64; N] {
@@ -75,7 +92,7 @@ fn sized<const N: usize>(
     forces: &[ActiveForce],
     x0: &[f64],
     inputs: &[Vec<f64>],
-    samples: usize,
+    grid: Grid,
     clock: &Clock,
 ) -> Option<Series> {
     let r = plant.inputs;
@@ -102,11 +119,15 @@ fn sized<const N: usize>(
                 .map(|(c, b)| c * b)
                 .sum(),
             memory: [0.0; 3],
+            rate_input: 0.0,
+            input: 0.0,
         })
         .collect();
-    let mut outputs = vec![vec![0.0; samples]; plant.outputs];
+    let mut outputs = vec![vec![0.0; grid.samples]; plant.outputs];
     let mut x: [f64; N] = array(x0);
-    for k in 0..samples {
+    // What the inputs add in a step, and to the rates: the same for all steps of a sample.
+    let mut pushed = [0.0; N];
+    for k in 0..grid.samples {
         for (o, row) in c.iter().enumerate() {
             let mut y = dot(row, &x);
             for &j in &direct[o] {
@@ -114,43 +135,50 @@ fn sized<const N: usize>(
             }
             outputs[o][k] = y;
         }
-        let mut next = [0.0; N];
-        for (next, row) in next.iter_mut().zip(&a) {
-            *next = dot(row, &x);
-        }
+        pushed.fill(0.0);
         for (column, input) in b.iter().zip(inputs) {
             let u = input[k];
-            for (next, b) in next.iter_mut().zip(column) {
-                *next += b * u;
+            for (pushed, b) in pushed.iter_mut().zip(column) {
+                *pushed += b * u;
             }
-        }
-        if !forces.is_empty() && !next.iter().all(|v| v.abs() < DIVERGED) {
-            return None;
         }
         for f in &mut forces {
-            let mut rate_input = 0.0;
-            if f.force.rate_matters {
-                for (gain, input) in f.force.rate_feedthrough.iter().zip(inputs) {
-                    rate_input += gain * input[k];
+            f.input = inputs.get(f.force.input).map_or(0.0, |u| u[k]);
+            f.rate_input = f
+                .force
+                .rate_feedthrough
+                .iter()
+                .zip(inputs)
+                .map(|(gain, input)| gain * input[k])
+                .sum();
+        }
+        for step in k * grid.steps..(k + 1) * grid.steps {
+            let mut next = pushed;
+            for (next, row) in next.iter_mut().zip(&a) {
+                *next += dot(row, &x);
+            }
+            if !forces.is_empty() && !next.iter().all(|v| v.abs() < DIVERGED) {
+                return None;
+            }
+            for f in &mut forces {
+                let motion = Motion {
+                    position: dot(&f.position, &x),
+                    position_free: dot(&f.position, &next),
+                    position_gain: f.position_gain,
+                    rate: dot(&f.rate, &x) + f.rate_input,
+                    rate_free: dot(&f.rate, &next) + f.rate_input,
+                    rate_gain: f.force.rate_gain,
+                    input: f.input,
+                    sample: step,
+                    clock: *clock,
+                };
+                let w = (f.force.law)(&f.force.parameters, &motion, &mut f.memory);
+                for (next, b) in next.iter_mut().zip(&f.direction) {
+                    *next += b * w;
                 }
             }
-            let motion = Motion {
-                position: dot(&f.position, &x),
-                position_free: dot(&f.position, &next),
-                position_gain: f.position_gain,
-                rate: dot(&f.rate, &x) + rate_input,
-                rate_free: dot(&f.rate, &next) + rate_input,
-                rate_gain: f.force.rate_gain,
-                input: inputs.get(f.force.input).map_or(0.0, |u| u[k]),
-                sample: k,
-                clock: *clock,
-            };
-            let w = (f.force.law)(&f.force.parameters, &motion, &mut f.memory);
-            for (next, b) in next.iter_mut().zip(&f.direction) {
-                *next += b * w;
-            }
+            x = next;
         }
-        x = next;
         if k % 64 == 0 && !x.iter().all(|v| v.abs() < DIVERGED) {
             return None;
         }

@@ -13,7 +13,7 @@ use super::fit::{Fit, Problem};
 use super::functionals::{Functionals, dot, matched_sign};
 use super::noise::Noise;
 use super::plant::Plant;
-use super::run::run;
+use super::run::{Grid, run};
 use super::structure::{Direction, Instance, Signal, Structure};
 use crate::linalg::multiply_tn;
 
@@ -424,7 +424,7 @@ pub(crate) fn motions(problem: &Problem, fit: &Fit, plant: &Plant) -> Vec<Signal
             &forces,
             x0,
             &inputs,
-            segment.samples(),
+            Grid::of_samples(segment.samples()),
             &clock(problem.data, index),
         )
         .unwrap_or_else(|| vec![vec![0.0; segment.samples()]; reader.outputs]);

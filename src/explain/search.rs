@@ -19,8 +19,9 @@ const HOPELESS: f64 = -10.0;
 /// Scouted fits that are pursued, and forms (places, plant free or not) of one effect among them.
 const PROMISING: usize = 12;
 const FORMS_EACH: usize = 3;
-/// Second effects that are fitted beside each first.
+/// Second effects that are scouted beside each form of a first, and pairs of one first that are pursued.
 const SECONDS_EACH: usize = 4;
+const PROMISING_SECONDS: usize = 4;
 
 /// The explanations without new physics.
 #[derive(Debug, Clone)]
@@ -167,7 +168,6 @@ pub(crate) fn single_effects(
     boring: &Boring,
     allowed: &(dyn Fn(&Definition) -> bool + Sync),
 ) -> Vec<Ranked> {
-    let count = problem.count();
     let mut leads: Vec<(usize, Lead)> = Vec::new();
     let bases = [boring.strict.clone(), boring.full.clone()];
     let screens: Vec<(usize, Vec<Vec<Lead>>)> = [0, 1]
@@ -214,6 +214,12 @@ pub(crate) fn single_effects(
             extended(&boring.full.structure, &boring.full.theta, lead)
         });
     }
+    pursued(problem, jobs, PROMISING)
+}
+
+/// Fits structures from their starts: a few steps for all, more for the `most` that promise best; best first.
+fn pursued(problem: &Problem, jobs: Vec<(Structure, Vec<f64>)>, most: usize) -> Vec<Ranked> {
+    let count = problem.count();
     let mut scouted: Vec<Ranked> = jobs
         .into_par_iter()
         .filter_map(|(structure, start)| fit_lead(problem, structure, start, Effort::SCOUT))
@@ -230,28 +236,18 @@ pub(crate) fn single_effects(
             .iter()
             .filter(|p| p.fit.structure.effects.last().map(|e| e.definition.id) == effect)
             .count();
-        if forms < FORMS_EACH && promising.len() < PROMISING {
+        if forms < FORMS_EACH && promising.len() < most {
             promising.push(r);
         }
     }
     let mut ranked: Vec<Ranked> = promising
         .into_par_iter()
-        .map(|r| {
-            let noise = r.fit.noise.clone();
-            let better = Fit::run(
-                problem,
-                r.fit.structure.clone(),
-                r.fit.theta.clone(),
-                Some(&noise),
-                Effort::RANK,
-            );
-            match better {
-                Some(fit) if fit.deviance < r.fit.deviance => Ranked {
-                    criterion: fit.criterion(count),
-                    fit,
-                },
-                _ => r,
-            }
+        .map(|r| match r.fit.improved(problem, Effort::RANK) {
+            Some(fit) if fit.deviance < r.fit.deviance => Ranked {
+                criterion: fit.criterion(count),
+                fit,
+            },
+            _ => r,
         })
         .collect();
     ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
@@ -390,13 +386,13 @@ fn scan(problem: &Problem, fit: &Fit, at: usize) -> Option<Vec<f64>> {
     Some(best)
 }
 
-/// Second effects beside each of `firsts`: screened around their fits, then fitted jointly; best first.
+/// Second effects beside each of `firsts`, which are forms of one effect: screened around their fits, then fitted
+/// jointly; best first.
 pub(crate) fn second_effects(
     problem: &Problem,
     firsts: &[&Ranked],
     allowed: &(dyn Fn(&Definition) -> bool + Sync),
 ) -> Vec<Ranked> {
-    let count = problem.count();
     let leads: Vec<(usize, Lead)> = firsts
         .par_iter()
         .enumerate()
@@ -417,18 +413,12 @@ pub(crate) fn second_effects(
                 .map(move |lead| (index, lead))
         })
         .collect();
-    let mut ranked: Vec<Ranked> = leads
-        .par_iter()
-        .filter_map(|(index, lead)| {
+    let jobs = leads
+        .iter()
+        .map(|(index, lead)| {
             let first = &firsts[*index].fit;
-            let (structure, start) = extended(&first.structure, &first.theta, lead);
-            fit_lead(problem, structure, start, Effort::RANK)
-        })
-        .map(|fit| Ranked {
-            criterion: fit.criterion(count),
-            fit,
+            extended(&first.structure, &first.theta, lead)
         })
         .collect();
-    ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
-    ranked
+    pursued(problem, jobs, PROMISING_SECONDS)
 }

@@ -12,7 +12,7 @@ use super::search::{Ranked, second_effects};
 
 /// A second effect must bring this share of what the first brought: misfit of the first breeds false seconds
 /// (math/explain.md, choice 9).
-pub(crate) const SECOND_SHARE: f64 = 0.1;
+const SECOND_SHARE: f64 = 0.1;
 
 /// ... and at least this much.
 pub(crate) const SECOND_GAIN: f64 = 30.0;
@@ -22,17 +22,9 @@ pub(crate) const SECOND_GAIN: f64 = 30.0;
 /// noise what is left of it is evidence for whatever comes near.
 const SECOND_VARIANCE: f64 = 0.005;
 
-/// Mean square error over the samples that count, each output on its own scale.
-fn mean_square(problem: &Problem, residual: &Series) -> f64 {
-    let (mut sum, mut n) = (0.0, 0usize);
-    for (s, (r, m)) in residual.iter().zip(&problem.mask).enumerate() {
-        let scale = problem.scale[s % problem.scale.len()];
-        for (r, _) in r.iter().zip(m).filter(|(_, keep)| **keep) {
-            sum += (r / scale).powi(2);
-            n += 1;
-        }
-    }
-    sum / n.max(1) as f64
+/// What a second effect must bring beside a first that brought `single`.
+pub(crate) fn required(single: f64) -> f64 {
+    SECOND_GAIN.max(SECOND_SHARE * single)
 }
 
 /// A second effect beside one of the two best singles, where the best single leaves something; `before` is the best
@@ -49,32 +41,32 @@ pub(crate) fn pair(
     ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     let best = ranked.first()?;
     let id = |r: &Ranked| r.fit.structure.new_effects()[0].definition.id;
-    // The two best effects, each with the plant free and as given: a free plant may hide the second effect.
-    let mut firsts: Vec<&Ranked> = Vec::new();
     // A resonance imitates any linear misfit, so it is no first effect unless it is the best.
-    let second = ranked
+    let other = ranked
         .iter()
         .find(|r| id(r) != id(best) && id(r) != "extra_mode");
-    for name in [Some(best), second].into_iter().flatten().map(id) {
-        for free in [true, false] {
-            firsts.extend(
-                ranked
-                    .iter()
-                    .find(|r| id(r) == name && r.fit.structure.plant_free == free),
-            );
-        }
-    }
     let single_gain = base - best.criterion;
-    let found = second_effects(problem, &firsts, allowed);
-    // Beside each first, since the best of one would keep the others from being refined.
+    // The two best effects, each with the plant free and as given: a free plant may hide the second effect. One after
+    // the other, since the best pair of one would keep those of the other from being pursued.
     let first = |r: &Ranked| r.fit.structure.new_effects()[0].definition.id;
-    let (of_best, of_second): (Vec<Ranked>, Vec<Ranked>) =
-        found.into_iter().partition(|r| first(r) == id(best));
-    let mut found = Vec::new();
-    for group in [of_best, of_second] {
-        found.extend(derived(problem, REFINEMENTS, &group, base, allowed));
-        found.extend(group);
-    }
+    let mut found: Vec<Ranked> = [Some(best), other]
+        .into_par_iter()
+        .flatten()
+        .flat_map_iter(|named| {
+            let forms: Vec<&Ranked> = [true, false]
+                .iter()
+                .filter_map(|free| {
+                    ranked
+                        .iter()
+                        .find(|r| id(r) == id(named) && r.fit.structure.plant_free == *free)
+                })
+                .collect();
+            let pairs = second_effects(problem, &forms, allowed);
+            let mut refined = derived(problem, REFINEMENTS, &pairs, base, allowed);
+            refined.extend(pairs);
+            refined
+        })
+        .collect();
     for r in &mut found {
         r.criterion += penalty(r, base, count);
     }
@@ -103,8 +95,8 @@ pub(crate) fn pair(
         })
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
     let gain = best.criterion - found.criterion;
-    let enough = gain > SECOND_GAIN.max(SECOND_SHARE * single_gain);
-    let size = |fit: &Fit| mean_square(problem, &fit.residual);
+    let enough = gain > required(single_gain);
+    let size = |fit: &Fit| problem.mean_square(&fit.residual);
     let (without, single, both) = (size(before), size(&best.fit), size(&found.fit));
     // Beside a plant that is free otherwise the first may have removed nothing of it.
     let shows = single - both >= SECOND_VARIANCE * (without - single).max(0.0);

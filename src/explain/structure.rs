@@ -13,7 +13,7 @@ use super::effects::{Action, Clock, Definition};
 use super::finer::Finer;
 use super::functionals::{Functionals, dot, matched_sign};
 use super::plant::Plant;
-use super::run::{ActiveForce, run};
+use super::run::{ActiveForce, Grid, run};
 
 /// The position and rate that a force looks at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -375,7 +375,6 @@ impl Structure {
             forces.push(ActiveForce {
                 law,
                 parameters: self.shape(theta, index),
-                rate_matters: true,
                 position: signal.position,
                 rate: signal.rate,
                 rate_feedthrough: signal.rate_feedthrough,
@@ -452,7 +451,14 @@ impl Structure {
         } else if let Some(finer) = finer {
             finer.run(&with_paths, forces, x0, &inputs, samples, clock)?
         } else {
-            run(&with_paths, forces, x0, &inputs, samples, clock)?
+            run(
+                &with_paths,
+                forces,
+                x0,
+                &inputs,
+                Grid::of_samples(samples),
+                clock,
+            )?
         };
         for (index, effect) in self.effects.iter().enumerate() {
             if matches!(effect.definition.action, Action::Mode) {

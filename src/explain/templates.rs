@@ -4,7 +4,7 @@ use super::data::Series;
 use super::effects::{self, Action, Definition, Motion, Needs, Observed};
 use super::functionals::Functionals;
 use super::plant::Plant;
-use super::run::run;
+use super::run::{Grid, run};
 use super::screen::{Bench, Signals, Template};
 use super::structure::{Direction, Instance, Signal, add_mode, add_sine};
 
@@ -93,7 +93,8 @@ impl Bench<'_> {
         let mut series = Vec::new();
         for (index, w) in drive.iter().enumerate() {
             let input = vec![w.clone()];
-            let y = run(&plant, &[], &zero, &input, w.len(), &self.clock(index))
+            let grid = Grid::of_samples(w.len());
+            let y = run(&plant, &[], &zero, &input, grid, &self.clock(index))
                 .unwrap_or_else(|| vec![vec![0.0; w.len()]; plant.outputs]);
             series.extend(y);
         }

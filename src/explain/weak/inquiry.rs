@@ -11,7 +11,7 @@ use super::super::noise::Mask;
 use super::super::plant::Plant;
 use super::super::prove;
 use super::super::search::Boring;
-use super::super::second::{SECOND_GAIN, SECOND_SHARE, look_alikes};
+use super::super::second::{look_alikes, required};
 use super::super::simulation::{Known, bare, delayed};
 use super::adequacy::{adequacy, holds};
 use super::laws::Form;
@@ -331,7 +331,7 @@ fn decide(chosen: &Ranking, data: &Data, problem: &Problem) -> Option<Decided> {
             resembles = last_law(pair).map(|law| (law, more));
         }
         if !suffices
-            && more > SECOND_GAIN.max(SECOND_SHARE * gain)
+            && more > required(gain)
             && foretells(pair, first)
             && runs_better(&pair.equation, &first.equation, windows, data, problem)
         {
