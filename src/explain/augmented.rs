@@ -58,7 +58,7 @@ impl AugmentedModel {
             .iter()
             .enumerate()
             .map(|(index, effect)| {
-                let force = matches!(effect.definition.action, Action::Force(..));
+                let force = effect.definition.action.is_force();
                 let numbers = structure.effect_numbers(theta, index);
                 let before =
                     effect.amplitudes(structure.states()) + effect.definition.parameters.len();
@@ -275,14 +275,8 @@ impl AugmentedModel {
             instances.push(instance);
             known.push(numbers);
         }
-        let coordinates = Coordinates {
-            given: plant,
-            free_rows: Vec::new(),
-            active_inputs: Vec::new(),
-            to_here: DMatrix::identity(n, n),
-        };
         Ok(Structure {
-            coordinates: Arc::new(coordinates),
+            coordinates: Arc::new(Coordinates::fixed(plant, Vec::new())),
             plant_free: false,
             initial_free: false,
             initial: self.initial_states.clone(),

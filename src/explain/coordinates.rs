@@ -6,8 +6,11 @@
 //! `B`, and the initial state. In contrast to poles and zeros they stay smooth where poles meet, and in contrast
 //! to the shift form they stay well scaled when the sampling is fast.
 
+use std::sync::OnceLock;
+
 use nalgebra::DMatrix;
 
+use super::functionals::Functionals;
 use super::plant::{Plant, row_major};
 use crate::linalg::svd_thin;
 
@@ -25,6 +28,7 @@ pub(crate) struct Coordinates {
     pub active_inputs: Vec<usize>,
     /// Takes the given state to these coordinates: `x_here = to_here * x_given`.
     pub to_here: DMatrix<f64>,
+    rows: OnceLock<Functionals>,
 }
 
 impl Coordinates {
@@ -75,9 +79,25 @@ impl Coordinates {
             given,
             free_rows,
             active_inputs,
-
             to_here: t,
+            rows: OnceLock::new(),
         }
+    }
+
+    /// Those of a plant that stays as it is.
+    pub fn fixed(plant: Plant, active_inputs: Vec<usize>) -> Self {
+        Self {
+            free_rows: Vec::new(),
+            active_inputs,
+            to_here: DMatrix::identity(plant.states, plant.states),
+            rows: OnceLock::new(),
+            given: plant,
+        }
+    }
+
+    /// What can be read off the state of the given plant.
+    pub fn given_rows(&self) -> &Functionals {
+        self.rows.get_or_init(|| Functionals::new(&self.given))
     }
 
     /// Numbers of `A` and `B` that are free.

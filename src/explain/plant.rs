@@ -59,6 +59,30 @@ impl Plant {
             .collect()
     }
 
+    /// Takes up a force `-(row x + feedthrough u)` that enters through `direction`, with the mean of its values at both
+    /// ends of a sample interval; without `feedthrough` it is zero.
+    pub fn add_linear_force(&mut self, direction: &[f64], row: &[f64], feedthrough: &[f64]) {
+        let (n, r) = (self.states, self.inputs);
+        // Half of `row (x + A x + B u)`.
+        let after = |matrix: &[f64], columns: usize, column: usize| -> f64 {
+            (0..n).map(|i| row[i] * matrix[i * columns + column]).sum()
+        };
+        let on_state: Vec<f64> = (0..n)
+            .map(|j| 0.5 * (row[j] + after(&self.a, n, j)))
+            .collect();
+        let on_input: Vec<f64> = (0..r)
+            .map(|j| 0.5 * after(&self.b, r, j) + feedthrough.get(j).unwrap_or(&0.0))
+            .collect();
+        for (i, d) in direction.iter().enumerate() {
+            for (a, row) in self.a[i * n..(i + 1) * n].iter_mut().zip(&on_state) {
+                *a -= d * row;
+            }
+            for (b, row) in self.b[i * r..(i + 1) * r].iter_mut().zip(&on_input) {
+                *b -= d * row;
+            }
+        }
+    }
+
     /// The same input-output behaviour in the state `T x`.
     pub fn transformed(&self, t: &DMatrix<f64>, t_inverse: &DMatrix<f64>) -> Self {
         Self {

@@ -35,6 +35,7 @@ pub(crate) struct Bench<'a> {
     pub problem: &'a Problem<'a>,
     pub basis: &'a Fit,
     pub plant: Plant,
+    pub rows: Functionals,
     pub noise: &'a Noise,
     /// Square roots of the weights of the values that count.
     pub weights: Vec<f64>,
@@ -126,6 +127,7 @@ impl<'a> Bench<'a> {
         }
         let rows = weights.len();
         let mut bench = Self {
+            rows: Functionals::new(&plant),
             problem,
             basis,
             plant,
@@ -301,7 +303,7 @@ impl<'a> Bench<'a> {
         let definition = instance.definition;
         let mut start = Vec::new();
         if let Action::Force(_, _, sense) = definition.action {
-            let rows = Functionals::new(&self.plant).of(&self.plant, instance.signal);
+            let rows = self.rows.of(&self.plant, instance.signal);
             match instance.direction {
                 Direction::Matched(input) => {
                     let amplitude = coefficients[0] * matched_sign(&self.plant, &rows.rate, input);
@@ -394,7 +396,8 @@ pub(crate) fn motions(problem: &Problem, fit: &Fit, plant: &Plant) -> Vec<Signal
             places.push(Signal::Difference(i, j));
         }
     }
-    let mut reader = plant.clone();
+    let prepared = fit.structure.prepare(&fit.theta);
+    let mut reader = prepared.plant.clone();
     reader.c.clear();
     reader.d.clear();
     for place in &places {
@@ -418,10 +421,9 @@ pub(crate) fn motions(problem: &Problem, fit: &Fit, plant: &Plant) -> Vec<Signal
         let (inputs, _) =
             fit.structure
                 .effective_inputs(&fit.theta, segment, &clock(problem.data, index));
-        let forces = fit.structure.prepare(&fit.theta, plant);
         let read = run(
             &reader,
-            &forces,
+            &prepared.forces,
             x0,
             &inputs,
             Grid::of_samples(segment.samples()),

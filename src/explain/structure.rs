@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::coordinates::{Coordinates, Derivatives};
 use super::data::{Data, Segment, Series};
-use super::effects::{Action, Clock, Definition};
+use super::effects::{Action, Clock, Definition, Needs};
 use super::finer::Finer;
 use super::functionals::{Functionals, dot, matched_sign};
 use super::plant::Plant;
@@ -58,10 +58,10 @@ impl Instance {
 
     /// Numbers before the shape parameters: amplitude or direction of a force.
     pub fn amplitudes(&self, states: usize) -> usize {
-        match (self.definition.action, self.direction) {
-            (Action::Force(..), Direction::Matched(_)) => 1,
-            (Action::Force(..), Direction::Free) => states,
-            _ => 0,
+        match self.direction {
+            _ if !self.definition.action.is_force() => 0,
+            Direction::Matched(_) => 1,
+            Direction::Free => states,
         }
     }
 
@@ -318,9 +318,7 @@ impl Structure {
 
     /// Simulated outputs of all segments; `None` when they leave any sensible range.
     pub fn simulate(&self, theta: &[f64], data: &Data) -> Option<Series> {
-        let plant = self.plant(theta);
-        let finer = self.finer(&plant);
-        let prepared = self.prepare(theta, &plant);
+        let prepared = self.prepare(theta);
         let mut outputs = Vec::with_capacity(data.segments.len() * data.outputs);
         for (index, segment) in data.segments.iter().enumerate() {
             let clock = Clock {
@@ -329,9 +327,7 @@ impl Structure {
                 fresh: false,
             };
             let x0 = self.initial_state(theta, index);
-            outputs.extend(
-                self.simulate_segment(theta, &plant, &finer, &prepared, segment, x0, &clock)?,
-            );
+            outputs.extend(self.simulate_segment(theta, &prepared, segment, x0, &clock)?);
         }
         Some(outputs)
     }
@@ -344,49 +340,61 @@ impl Structure {
         sample_time: f64,
         x0: &[f64],
     ) -> Option<Series> {
-        let plant = self.plant(theta);
-        let finer = self.finer(&plant);
-        let prepared = self.prepare(theta, &plant);
         let clock = Clock {
             start: segment.start_time,
             step: sample_time,
             fresh: true,
         };
-        self.simulate_segment(theta, &plant, &finer, &prepared, segment, x0, &clock)
+        self.simulate_segment(theta, &self.prepare(theta), segment, x0, &clock)
     }
 
-    fn finer(&self, plant: &Plant) -> Option<Finer> {
-        (self.substeps > 1)
-            .then(|| Finer::new(plant, self.substeps))
-            .flatten()
-    }
-
-    pub fn prepare(&self, theta: &[f64], plant: &Plant) -> Vec<ActiveForce> {
+    /// What all segments share.
+    pub fn prepare(&self, theta: &[f64]) -> Prepared {
+        let mut plant = self.plant(theta);
         let mut forces = Vec::new();
-        let mut rows: Option<Functionals> = None;
+        let mut own_rows: Option<Functionals> = None;
         for (index, effect) in self.effects.iter().enumerate() {
-            let Action::Force(law, ..) = effect.definition.action else {
+            if !effect.definition.action.is_force() {
                 continue;
+            }
+            // The plant as given is the same for all numbers.
+            let rows = if self.plant_free {
+                &*own_rows.get_or_insert_with(|| Functionals::new(&plant))
+            } else {
+                self.coordinates.given_rows()
             };
-            let rows = rows.get_or_insert_with(|| Functionals::new(plant));
-            let signal = rows.of(plant, effect.signal);
-            let direction = self.direction(theta, plant, rows, index);
-            let rate_gain = dot(&signal.rate, &direction);
-            forces.push(ActiveForce {
-                law,
-                parameters: self.shape(theta, index),
-                position: signal.position,
-                rate: signal.rate,
-                rate_feedthrough: signal.rate_feedthrough,
-                direction,
-                rate_gain,
-                input: match effect.direction {
-                    Direction::Matched(input) => input,
-                    Direction::Free => effect.channel,
-                },
-            });
+            let signal = rows.of(&plant, effect.signal);
+            let direction = self.direction(theta, &plant, rows, index);
+            match effect.definition.action {
+                Action::Linear(Needs::Position) => {
+                    plant.add_linear_force(&direction, &signal.position, &[]);
+                }
+                Action::Linear(_) => {
+                    plant.add_linear_force(&direction, &signal.rate, &signal.rate_feedthrough);
+                }
+                Action::Force(law, ..) => forces.push(ActiveForce {
+                    law,
+                    parameters: self.shape(theta, index),
+                    rate_gain: dot(&signal.rate, &direction),
+                    position: signal.position,
+                    rate: signal.rate,
+                    rate_feedthrough: signal.rate_feedthrough,
+                    direction,
+                    input: match effect.direction {
+                        Direction::Matched(input) => input,
+                        Direction::Free => effect.channel,
+                    },
+                }),
+                _ => {}
+            }
         }
-        forces
+        Prepared {
+            finer: (self.substeps > 1)
+                .then(|| Finer::new(&plant, self.substeps))
+                .flatten(),
+            plant,
+            forces,
+        }
     }
 
     /// Inputs as the plant sees them, and their moments within the intervals where a law has any.
@@ -417,22 +425,17 @@ impl Structure {
         )
     }
 
-    #[allow(
-        clippy::too_many_arguments,
-        reason = "what is prepared once for all segments"
-    )]
     fn simulate_segment(
         &self,
         theta: &[f64],
-        plant: &Plant,
-        finer: &Option<Finer>,
-        forces: &[ActiveForce],
+        prepared: &Prepared,
         segment: &Segment,
         x0: &[f64],
         clock: &Clock,
     ) -> Option<Series> {
         let (mut inputs, moments) = self.effective_inputs(theta, segment, clock);
-        let mut with_paths = Cow::Borrowed(plant);
+        let forces = &prepared.forces;
+        let mut with_paths = Cow::Borrowed(&prepared.plant);
         for (index, effect) in self.effects.iter().enumerate() {
             if matches!(effect.definition.action, Action::MissingPath) {
                 let plant = with_paths.to_mut();
@@ -448,7 +451,7 @@ impl Structure {
         let samples = segment.samples();
         let mut outputs = if self.is_tanks() {
             super::tanks::simulate(self, theta, &inputs, x0, clock)?
-        } else if let Some(finer) = finer {
+        } else if let Some(finer) = &prepared.finer {
             finer.run(&with_paths, forces, x0, &inputs, samples, clock)?
         } else {
             run(
@@ -491,6 +494,14 @@ impl Structure {
         }
         Some(outputs)
     }
+}
+
+/// What all segments share at one parameter vector.
+#[derive(Debug, Clone)]
+pub(crate) struct Prepared {
+    pub plant: Plant,
+    pub forces: Vec<ActiveForce>,
+    finer: Option<Finer>,
 }
 
 /// The plant with the first moments of its inputs as further inputs.

@@ -312,21 +312,17 @@ fn structured(
 
 /// Coordinates of so many states whose plant does nothing.
 fn still(data: &Data, states: usize) -> Coordinates {
-    Coordinates {
-        given: Plant {
-            states,
-            inputs: data.inputs,
-            outputs: 1,
-            a: vec![0.0; states * states],
-            b: vec![0.0; states * data.inputs],
-            c: vec![0.0; states],
-            d: vec![0.0; data.inputs],
-            sample_time: data.sample_time,
-        },
-        free_rows: Vec::new(),
-        active_inputs: vec![0],
-        to_here: DMatrix::identity(states, states),
-    }
+    let plant = Plant {
+        states,
+        inputs: data.inputs,
+        outputs: 1,
+        a: vec![0.0; states * states],
+        b: vec![0.0; states * data.inputs],
+        c: vec![0.0; states],
+        d: vec![0.0; data.inputs],
+        sample_time: data.sample_time,
+    };
+    Coordinates::fixed(plant, vec![0])
 }
 
 /// What the tanks do near their mean levels at the mean input; where there is a constant input, the operating point

@@ -2,7 +2,6 @@
 
 use super::data::Series;
 use super::effects::{self, Action, Definition, Motion, Needs, Observed};
-use super::functionals::Functionals;
 use super::plant::Plant;
 use super::run::{Grid, run};
 use super::screen::{Bench, Signals, Template};
@@ -55,7 +54,7 @@ impl Bench<'_> {
                     ),
                 })
                 .collect(),
-            Action::Exact | Action::Process => Vec::new(),
+            Action::Linear(_) | Action::Exact | Action::Process => Vec::new(),
         }
     }
 
@@ -267,7 +266,7 @@ impl Bench<'_> {
         let Action::Force(law, ..) = definition.action else {
             return Vec::new();
         };
-        let rows = Functionals::new(&self.plant);
+        let rows = &self.rows;
         let aperiodic = crate::linalg::eigenvalues(&self.plant.a_matrix())
             .is_ok_and(|poles| poles.iter().all(|p| p.im == 0.0));
         let mut templates = Vec::new();

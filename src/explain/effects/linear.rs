@@ -4,7 +4,7 @@
 //! degenerates to one of them (a stop at the origin is a spring) would win by having fewer numbers than a whole new
 //! plant.
 
-use super::{Action, Clock, Definition, Motion, Needs, Parameter, Sense, Unit};
+use super::{Action, Clock, Definition, Needs, Parameter, Unit};
 
 pub(super) static ENTRIES: &[Definition] = &[
     Definition {
@@ -28,7 +28,7 @@ pub(super) static ENTRIES: &[Definition] = &[
         mimics: &[],
         linear: &[],
         persists: true,
-        action: Action::Force(stiffness, Needs::Position, Sense::Either),
+        action: Action::Linear(Needs::Position),
         starts: |_| Vec::new(),
     },
     Definition {
@@ -40,7 +40,7 @@ pub(super) static ENTRIES: &[Definition] = &[
         mimics: &[],
         linear: &[],
         persists: true,
-        action: Action::Force(damping, Needs::Rate, Sense::Either),
+        action: Action::Linear(Needs::Rate),
         starts: |_| Vec::new(),
     },
 ];
@@ -49,12 +49,4 @@ fn gain(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
     for u in u {
         *u *= 1.0 + p[0];
     }
-}
-
-fn stiffness(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    -motion.middle()
-}
-
-fn damping(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    -motion.middle_rate()
 }

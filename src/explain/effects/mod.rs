@@ -146,6 +146,8 @@ pub(crate) enum Action {
     Input(InputLaw),
     /// A force through a direction.
     Force(ForceLaw, Needs, Sense),
+    /// A force minus the position or the rate, which becomes part of the plant.
+    Linear(Needs),
     /// Changes an output channel.
     Sensor(ChannelLaw),
     /// A second-order path beside the plant (`extra_mode`).
@@ -160,11 +162,19 @@ pub(crate) enum Action {
     Exact,
 }
 
+impl Action {
+    /// Whether it enters the state equation through a direction.
+    pub fn is_force(&self) -> bool {
+        matches!(self, Self::Force(..) | Self::Linear(_))
+    }
+}
+
 impl std::fmt::Debug for Action {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Input(_) => "Input",
             Self::Force(..) => "Force",
+            Self::Linear(_) => "Linear",
             Self::Sensor(_) => "Sensor",
             Self::Mode => "Mode",
             Self::Sine => "Sine",
@@ -226,7 +236,7 @@ impl Definition {
     pub fn port(&self) -> Port {
         match self.action {
             Action::Input(_) => Port::Input,
-            Action::Force(..) => Port::Force,
+            Action::Force(..) | Action::Linear(_) => Port::Force,
             Action::Sensor(_) | Action::Sine => Port::Sensor,
             Action::Mode | Action::MissingPath => Port::Path,
             Action::Process => Port::Process,

@@ -244,12 +244,7 @@ impl Equation {
         }
         Some((
             Structure {
-                coordinates: Arc::new(Coordinates {
-                    given: plant,
-                    free_rows: Vec::new(),
-                    active_inputs: vec![0, 1],
-                    to_here: DMatrix::identity(n, n),
-                }),
+                coordinates: Arc::new(Coordinates::fixed(plant, vec![0, 1])),
                 plant_free: false,
                 initial_free: false,
                 initial: starts.iter().map(|s| s[..n].to_vec()).collect(),
