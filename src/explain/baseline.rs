@@ -53,48 +53,84 @@ pub(crate) fn identify_simulator(data: &Data) -> Option<Simulator> {
     best
 }
 
-fn of_order(data: &Data, order: usize) -> Option<Simulator> {
-    let (r, l) = (data.inputs, data.outputs);
-    let q = r + l;
-    let rows: usize = data
-        .segments
-        .iter()
-        .map(|s| s.samples().saturating_sub(order))
-        .sum();
-    let columns = order * q + r;
-    if rows < 3 * columns {
-        return None;
-    }
-    // Rows: [u(k), z(k-1), ..., z(k-order)], z = [u; y]; channels scaled to one size.
-    let (us, ys) = (data.input_scale(), data.output_scale());
-    let mut regressors = DMatrix::zeros(rows, columns);
-    let mut targets = DMatrix::zeros(rows, l);
-    let mut row = 0;
-    for segment in &data.segments {
-        for k in order..segment.samples() {
-            for j in 0..r {
-                regressors[(row, j)] = segment.inputs[j][k] / us[j];
-            }
-            for lag in 1..=order {
-                let at = r + (lag - 1) * q;
+/// Regression of the outputs on the present inputs and the past of all channels, each scaled to one size.
+pub(super) struct Autoregression {
+    /// Rows `[u(k), z(k-1), ..., z(k-order)]` with `z = [u; y]`, then a one if there is a constant.
+    pub regressors: DMatrix<f64>,
+    /// Rows `y(k)`.
+    pub targets: DMatrix<f64>,
+    pub input_scale: Vec<f64>,
+    pub output_scale: Vec<f64>,
+}
+
+impl Autoregression {
+    /// `None` with too few samples for so many coefficients.
+    pub fn new(data: &Data, order: usize, constant: bool) -> Option<Self> {
+        let (r, l) = (data.inputs, data.outputs);
+        let rows: usize = data
+            .segments
+            .iter()
+            .map(|s| s.samples().saturating_sub(order))
+            .sum();
+        let columns = r + order * (r + l) + usize::from(constant);
+        if rows < 3 * columns {
+            return None;
+        }
+        let (input_scale, output_scale) = (data.input_scale(), data.output_scale());
+        let mut regressors = DMatrix::zeros(rows, columns);
+        let mut targets = DMatrix::zeros(rows, l);
+        let times = data
+            .segments
+            .iter()
+            .flat_map(|segment| (order..segment.samples()).map(move |k| (segment, k)));
+        for (row, (segment, k)) in times.enumerate() {
+            for lag in 0..=order {
                 for j in 0..r {
-                    regressors[(row, at + j)] = segment.inputs[j][k - lag] / us[j];
+                    regressors[(row, Self::column(data, lag, j))] =
+                        segment.inputs[j][k - lag] / input_scale[j];
                 }
-                for o in 0..l {
-                    regressors[(row, at + r + o)] = segment.outputs[o][k - lag] / ys[o];
+                for o in (0..l).filter(|_| lag > 0) {
+                    regressors[(row, Self::column(data, lag, r + o))] =
+                        segment.outputs[o][k - lag] / output_scale[o];
                 }
+            }
+            if constant {
+                regressors[(row, columns - 1)] = 1.0;
             }
             for o in 0..l {
-                targets[(row, o)] = segment.outputs[o][k] / ys[o];
+                targets[(row, o)] = segment.outputs[o][k] / output_scale[o];
             }
-            row += 1;
+        }
+        Some(Self {
+            regressors,
+            targets,
+            input_scale,
+            output_scale,
+        })
+    }
+
+    /// Column of a channel of `z` at a lag.
+    pub fn column(data: &Data, lag: usize, channel: usize) -> usize {
+        if lag == 0 {
+            channel
+        } else {
+            data.inputs + (lag - 1) * (data.inputs + data.outputs) + channel
         }
     }
+}
+
+fn of_order(data: &Data, order: usize) -> Option<Simulator> {
+    let Autoregression {
+        regressors,
+        targets,
+        input_scale,
+        output_scale,
+    } = Autoregression::new(data, order, false)?;
     let coefficients = least_squares(&regressors, &targets).ok()?;
     if !coefficients.iter().all(|c| c.is_finite()) {
         return None;
     }
-    let plant = realise(&coefficients, data, order, &us, &ys)?;
+    let plant = realise(&coefficients, data, order, &input_scale, &output_scale)?;
     let (initial, misfit) = initial_states(&plant, data)?;
     Some(Simulator {
         plant,

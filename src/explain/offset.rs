@@ -5,6 +5,7 @@
 
 use nalgebra::DMatrix;
 
+use super::baseline::Autoregression;
 use super::data::Data;
 use crate::linalg::least_squares;
 
@@ -22,61 +23,28 @@ pub(crate) fn operating_point(data: &Data) -> Option<Vec<f64>> {
 /// Least squares of `y[k] = sum A_i y[k-i] + sum B_i u[k-i] + k0`, all channels scaled, and `(I - sum A_i) c = k0`.
 fn of_order(data: &Data, order: usize) -> Option<Vec<f64>> {
     let (r, l) = (data.inputs, data.outputs);
-    let q = r + l;
-    let columns = order * q + r + 1;
-    // Columns: u(k), then u and y of each lag, then 1.
-    let at = |lag: usize, channel: usize| {
-        if lag == 0 {
-            channel
-        } else {
-            r + (lag - 1) * q + channel
-        }
-    };
-    let rows: usize = data
-        .segments
-        .iter()
-        .map(|s| s.samples().saturating_sub(order))
-        .sum();
-    if rows < 3 * columns {
-        return None;
-    }
-    let (us, ys) = (data.input_scale(), data.output_scale());
-    let mut regressors = DMatrix::zeros(rows, columns);
-    let mut targets = DMatrix::zeros(rows, l);
-    let mut row = 0;
-    for segment in &data.segments {
-        for k in order..segment.samples() {
-            for lag in 0..=order {
-                for j in 0..r {
-                    regressors[(row, at(lag, j))] = segment.inputs[j][k - lag] / us[j];
-                }
-                for o in (0..l).filter(|_| lag > 0) {
-                    regressors[(row, at(lag, r + o))] = segment.outputs[o][k - lag] / ys[o];
-                }
-            }
-            regressors[(row, columns - 1)] = 1.0;
-            for o in 0..l {
-                targets[(row, o)] = segment.outputs[o][k] / ys[o];
-            }
-            row += 1;
-        }
-    }
+    let Autoregression {
+        regressors,
+        targets,
+        output_scale,
+        ..
+    } = Autoregression::new(data, order, true)?;
     let found = least_squares(&regressors, &targets).ok()?;
     let missed = (&targets - crate::linalg::multiply(&regressors, &found)).norm();
-    if missed.is_nan() || missed > EXACT * ((rows * l) as f64).sqrt() {
+    if missed.is_nan() || missed > EXACT * (targets.len() as f64).sqrt() {
         return None;
     }
     let mut through = DMatrix::<f64>::identity(l, l);
     for lag in 1..=order {
         for o in 0..l {
             for p in 0..l {
-                through[(o, p)] -= found[(at(lag, r + p), o)];
+                through[(o, p)] -= found[(Autoregression::column(data, lag, r + p), o)];
             }
         }
     }
-    let constant = DMatrix::from_fn(l, 1, |o, _| found[(columns - 1, o)]);
+    let constant = DMatrix::from_fn(l, 1, |o, _| found[(found.nrows() - 1, o)]);
     let c = through.lu().solve(&constant)?;
-    let c: Vec<f64> = (0..l).map(|o| c[(o, 0)] * ys[o]).collect();
+    let c: Vec<f64> = (0..l).map(|o| c[(o, 0)] * output_scale[o]).collect();
     c.iter().all(|v| v.is_finite()).then_some(c)
 }
 

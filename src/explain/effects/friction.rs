@@ -2,6 +2,20 @@
 
 use super::{Action, Definition, Mimic, Motion, Needs, Observed, Parameter, Sense, Unit, level};
 
+const NO_BREAKAWAY: Mimic = Mimic {
+    effect: "coulomb_friction",
+    experiment: "slow constant velocities from standstill upwards: only Stribeck friction falls as the speed rises",
+};
+const LONG_LOOP: Mimic = Mimic {
+    effect: "hysteresis",
+    experiment: "a slow triangle at several amplitudes: the elastic part of dry friction is short",
+};
+const BREAKAWAY_EXCESS: Parameter = Parameter {
+    lower: 0.02,
+    upper: 20.0,
+    ..Parameter::positive("breakaway_excess", Unit::Ratio)
+};
+
 pub(super) static ENTRIES: &[Definition] = &[
     Definition {
         id: "coulomb_friction",
@@ -34,10 +48,7 @@ pub(super) static ENTRIES: &[Definition] = &[
         name: "Coulomb friction with elastic pre-sliding",
         equation: "F = -Fc z, dz/dt = v/zs (1 - z sign(v))",
         parameters: &[Parameter::positive("presliding_distance", Unit::Position)],
-        mimics: &[Mimic {
-            effect: "hysteresis",
-            experiment: "a slow triangle at several amplitudes: the elastic part of dry friction is short",
-        }],
+        mimics: &[LONG_LOOP],
         linear: &[],
         persists: true,
         action: Action::Force(bristle, Needs::Position, Sense::Resists),
@@ -52,10 +63,7 @@ pub(super) static ENTRIES: &[Definition] = &[
             Parameter::positive("presliding_distance", Unit::Position),
             Parameter::positive("bristle_damping_time", Unit::Second),
         ],
-        mimics: &[Mimic {
-            effect: "hysteresis",
-            experiment: "a slow triangle at several amplitudes: the elastic part of dry friction is short",
-        }],
+        mimics: &[LONG_LOOP],
         linear: &[],
         persists: true,
         action: Action::Force(damped_bristle, Needs::Position, Sense::Resists),
@@ -82,17 +90,10 @@ pub(super) static ENTRIES: &[Definition] = &[
         name: "friction with breakaway (Stribeck)",
         equation: "F = -Fc (1 + b exp(-(v/vs)^2)) sign(v), sticking at v = 0",
         parameters: &[
-            Parameter {
-                lower: 0.02,
-                upper: 20.0,
-                ..Parameter::positive("breakaway_excess", Unit::Ratio)
-            },
+            BREAKAWAY_EXCESS,
             Parameter::positive("stribeck_velocity", Unit::Rate),
         ],
-        mimics: &[Mimic {
-            effect: "coulomb_friction",
-            experiment: "slow constant velocities from standstill upwards: only Stribeck friction falls as the speed rises",
-        }],
+        mimics: &[NO_BREAKAWAY],
         linear: &[],
         persists: true,
         action: Action::Force(stribeck, Needs::Rate, Sense::Resists),
@@ -105,17 +106,10 @@ pub(super) static ENTRIES: &[Definition] = &[
         equation: "F = -Fc (1 + b exp(-(v/vs)^2)) z, dz/dt = v/zs (1 - z sign(v))",
         parameters: &[
             Parameter::positive("presliding_distance", Unit::Position),
-            Parameter {
-                lower: 0.02,
-                upper: 20.0,
-                ..Parameter::positive("breakaway_excess", Unit::Ratio)
-            },
+            BREAKAWAY_EXCESS,
             Parameter::positive("stribeck_velocity", Unit::Rate),
         ],
-        mimics: &[Mimic {
-            effect: "coulomb_friction",
-            experiment: "slow constant velocities from standstill upwards: only Stribeck friction falls as the speed rises",
-        }],
+        mimics: &[NO_BREAKAWAY],
         linear: &[],
         persists: true,
         action: Action::Force(breakaway_bristle, Needs::Position, Sense::Resists),
@@ -129,17 +123,10 @@ pub(super) static ENTRIES: &[Definition] = &[
         parameters: &[
             Parameter::positive("presliding_distance", Unit::Position),
             Parameter::positive("bristle_damping_time", Unit::Second),
-            Parameter {
-                lower: 0.02,
-                upper: 20.0,
-                ..Parameter::positive("breakaway_excess", Unit::Ratio)
-            },
+            BREAKAWAY_EXCESS,
             Parameter::positive("stribeck_velocity", Unit::Rate),
         ],
-        mimics: &[Mimic {
-            effect: "coulomb_friction",
-            experiment: "slow constant velocities from standstill upwards: only Stribeck friction falls as the speed rises",
-        }],
+        mimics: &[NO_BREAKAWAY],
         linear: &[],
         persists: true,
         action: Action::Force(damped_breakaway_bristle, Needs::Position, Sense::Resists),
