@@ -31,8 +31,9 @@ impl Answer<'_> {
 
     pub(crate) fn effects(&self, problem: &Problem, model: &Fit) -> Vec<EffectFound> {
         let mut fit = model.clone();
-        let covariance = fit.covariance(problem);
-        let disagreement = fit.halves_disagree(problem);
+        let certainty = fit.certainty(problem);
+        let covariance = certainty.as_ref().map(|c| &c.covariance);
+        let disagreement = certainty.as_ref().and_then(|c| c.halves_disagree.as_ref());
         let mut found = Vec::new();
         let structure = &model.structure;
         for index in structure.first_new()..structure.effects.len() {
@@ -42,11 +43,11 @@ impl Answer<'_> {
             let (input, output) = self.channels_of(effect);
             let integral = matches!(effect.signal, Signal::Integral(_));
             let offset = model.structure.effect_offset(index);
-            let std = |at: usize| covariance.as_ref().map(|c| c[(at, at)].max(0.0).sqrt());
+            let std = |at: usize| covariance.map(|c| c[(at, at)].max(0.0).sqrt());
             let mut parameters = BTreeMap::new();
             let amplitudes = effect.amplitudes(model.structure.states());
             if let Action::Force(..) = definition.action {
-                self.amplitude(model, index, covariance.as_ref(), &mut parameters);
+                self.amplitude(model, index, covariance, &mut parameters);
             }
             for (i, p) in definition.parameters.iter().enumerate() {
                 let at = offset + amplitudes + i;
@@ -63,8 +64,7 @@ impl Answer<'_> {
             let mut signal = signal;
             if let Action::Sine = definition.action {
                 let from = offset + amplitudes + definition.parameters.len();
-                signal =
-                    self.sine_amplitudes(model, index, from, covariance.as_ref(), &mut parameters);
+                signal = self.sine_amplitudes(model, index, from, covariance, &mut parameters);
             }
             let mut effect_found = EffectFound {
                 effect: definition.id.to_owned(),
@@ -78,12 +78,10 @@ impl Answer<'_> {
                     criterion_needed: NEEDED,
                     heldout_gain: None,
                     // What begins at some time is not in both halves.
-                    halves_disagree: disagreement.as_ref().filter(|_| !definition.changes()).map(
-                        |z| {
-                            let end = offset + effect.len(structure.states(), structure.outputs());
-                            z[offset..end].iter().copied().fold(0.0, f64::max)
-                        },
-                    ),
+                    halves_disagree: disagreement.filter(|_| !definition.changes()).map(|z| {
+                        let end = offset + effect.len(structure.states(), structure.outputs());
+                        z[offset..end].iter().copied().fold(0.0, f64::max)
+                    }),
                 },
                 sentence: String::new(),
             };

@@ -59,9 +59,10 @@ pub fn explain(
     let drive = weak::attempt(recordings, &known, &allowed);
     // What the averaged equation explains to noise needs no other way.
     let settled = drive.as_ref().is_some_and(|(_, finding, _)| {
-        finding
-            .adequacy
-            .is_none_or(|a| a.p_value > super::adequacy::LEVEL || a.share < MOSTLY_NOISE)
+        finding.verdict != Verdict::Unexplained
+            && finding
+                .adequacy
+                .is_none_or(|a| a.p_value > super::adequacy::LEVEL || a.share < MOSTLY_NOISE)
     });
     let ordinary = (!settled)
         .then(|| inquire(&known.data, &known.structure, &allowed))
@@ -92,14 +93,18 @@ pub fn explain(
 
 /// Whether a free-run fit tells more of a drive than its averaged equation, which leaves structure.
 fn tells_more(free_run: &Finding, averaged: &Finding, data: &Data) -> bool {
-    // Where a free run drifts, a trend stands for whatever it misses.
+    // Where a free run drifts, a trend stands for whatever it misses; unless nothing is left.
     let trend = free_run.model.structure.new_effects().iter().any(|e| {
         matches!(
             e.definition.id,
             "sensor_drift" | "sensor_offset" | "load_step" | "periodic_disturbance"
         )
     });
-    if trend && averaged.weak.as_ref().is_some_and(|proof| proof.drifts()) {
+    let leaves_noise = |a: &super::adequacy::Adequacy| a.p_value > super::adequacy::LEVEL;
+    if trend
+        && averaged.weak.as_ref().is_some_and(|proof| proof.drifts())
+        && !free_run.adequacy.as_ref().is_some_and(leaves_noise)
+    {
         return false;
     }
     averaged.verdict != Verdict::Named

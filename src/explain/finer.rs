@@ -111,7 +111,15 @@ mod tests {
             step: 0.01,
             fresh: false,
         };
-        let coarse = run(&plant, &[], &[0.3, -0.1], &input, Grid::of_samples(200), &clock).unwrap();
+        let coarse = run(
+            &plant,
+            &[],
+            &[0.3, -0.1],
+            &input,
+            Grid::of_samples(200),
+            &clock,
+        )
+        .unwrap();
         let finer = Finer::new(&plant, 4).unwrap();
         let fine = finer
             .run(&plant, &[], &[0.3, -0.1], &input, 200, &clock)

@@ -181,7 +181,11 @@ impl Fit {
     /// The fit of all free numbers that begins with those of this one, and with its noise model.
     pub fn improved(&self, problem: &Problem, effort: Effort) -> Option<Self> {
         let mut fit = self.clone();
-        let rounds = if fit.theta.is_empty() { 1 } else { effort.rounds };
+        let rounds = if fit.theta.is_empty() {
+            1
+        } else {
+            effort.rounds
+        };
         let mut best: Option<Self> = None;
         for _ in 0..rounds {
             let noise = fit.noise.clone();
@@ -347,19 +351,8 @@ impl Fit {
         })
     }
 
-    /// Covariance of the numbers (those that move nothing have none).
-    pub fn covariance(&mut self, problem: &Problem) -> Option<DMatrix<f64>> {
-        let noise = self.noise.clone();
-        let jacobian = self.jacobian(problem, &noise)?;
-        jacobian
-            .normal_equations(problem, &noise, &self.residual, None)
-            .covariance()
-    }
-
-    /// How far the two halves of the recordings disagree about each number, in standard deviations of the difference:
-    /// one Gauss-Newton step of each half from the common optimum, which is as good as a fit of each (one-step
-    /// estimation, Le Cam 1956). Numbers that move nothing, or that a half does not determine, disagree by zero.
-    pub fn halves_disagree(&mut self, problem: &Problem) -> Option<Vec<f64>> {
+    /// How well the numbers are known.
+    pub fn certainty(&mut self, problem: &Problem) -> Option<Certainty> {
         let noise = self.noise.clone();
         let jacobian = self.jacobian(problem, &noise)?;
         let first: Vec<bool> = problem
@@ -372,25 +365,41 @@ impl Fit {
                     .filter_map(move |(k, keep)| keep.then_some(2 * k < n))
             })
             .collect();
+        let second: Vec<bool> = first.iter().map(|first| !first).collect();
         let half = |rows: &[bool]| {
             let system = jacobian.normal_equations(problem, &noise, &self.residual, Some(rows));
             Some((system.step(0.0)?, system.covariance()?))
         };
-        let second: Vec<bool> = first.iter().map(|first| !first).collect();
-        let ((a, va), (b, vb)) = (half(&first)?, half(&second)?);
-        Some(
-            (0..self.theta.len())
-                .map(|i| {
-                    let variance = va[(i, i)] + vb[(i, i)];
-                    if variance > 0.0 {
-                        (a[i] - b[i]).abs() / variance.sqrt()
-                    } else {
-                        0.0
-                    }
-                })
-                .collect(),
-        )
+        let halves = half(&first).zip(half(&second));
+        Some(Certainty {
+            covariance: jacobian
+                .normal_equations(problem, &noise, &self.residual, None)
+                .covariance()?,
+            halves_disagree: halves.map(|((a, va), (b, vb))| {
+                (0..self.theta.len())
+                    .map(|i| {
+                        let variance = va[(i, i)] + vb[(i, i)];
+                        if variance > 0.0 {
+                            (a[i] - b[i]).abs() / variance.sqrt()
+                        } else {
+                            0.0
+                        }
+                    })
+                    .collect()
+            }),
+        })
     }
+}
+
+/// How well the numbers of a fit are known.
+#[derive(Debug, Clone)]
+pub(crate) struct Certainty {
+    /// Covariance of the numbers; those that move nothing have none.
+    pub covariance: DMatrix<f64>,
+    /// How far the two halves of the recordings disagree about each number, in standard deviations of the difference:
+    /// one Gauss-Newton step of each half from the common optimum, which is as good as a fit of each (one-step
+    /// estimation, Le Cam 1956). Numbers that move nothing disagree by zero. None where a half does not determine all.
+    pub halves_disagree: Option<Vec<f64>>,
 }
 
 /// Whitened derivatives, a column a number that moves anything.
@@ -420,7 +429,11 @@ impl Jacobian {
             .whiten(&change)
             .iter()
             .zip(&problem.mask)
-            .flat_map(|(v, mask)| v.iter().zip(mask).filter_map(|(v, keep)| keep.then_some(*v)))
+            .flat_map(|(v, mask)| {
+                v.iter()
+                    .zip(mask)
+                    .filter_map(|(v, keep)| keep.then_some(*v))
+            })
             .collect();
         let step = DVector::from_iterator(self.used.len(), self.used.iter().map(|i| step[*i]));
         let missed = DVector::from_vec(missed) - &self.columns * &step;

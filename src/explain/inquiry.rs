@@ -196,9 +196,8 @@ pub(crate) fn inquire(
         let mut gain = base - fit.criterion(count);
         // Where nothing is left, or less than a second effect must bring, there is none to find.
         let left = adequacy(&problem, &fit, &finding.boring.given, None);
-        let nothing_left = left.is_some_and(|a| {
-            a.p_value > NOTHING_LEFT || a.gain(count) < second::required(gain)
-        });
+        let nothing_left = left
+            .is_some_and(|a| a.p_value > NOTHING_LEFT || a.gain(count) < second::required(gain));
         let second = if nothing_left || other_class {
             None
         } else {
@@ -240,7 +239,11 @@ pub(crate) fn inquire(
             &finding.boring.given,
             None,
         );
-        let holds = finding.adequacy.is_none_or(|a| a.holds());
+        // Rounding is no noise: what it makes up may show as structure.
+        let rounded = coarse.map_or(0.0, |(_, _, share)| share);
+        let holds = finding
+            .adequacy
+            .is_none_or(|a| a.holds() || a.share < rounded);
         finding.verdict = if !holds {
             Verdict::Unexplained
         } else if !finding.freezes.is_empty() || finding.coarse.is_some() {
@@ -268,9 +271,12 @@ fn coarse_sensor(problem: &Problem, fit: &Fit) -> Option<(usize, f64, f64)> {
         .enumerate()
         .filter_map(|(series, y)| {
             let step = spacing(y)?;
-            let residual = &fit.residual[series];
-            let variance =
-                residual.iter().map(|r| r * r).sum::<f64>() / residual.len().max(1) as f64;
+            let counted = fit.residual[series]
+                .iter()
+                .zip(&problem.mask[series])
+                .filter_map(|(e, keep)| keep.then_some(e * e));
+            let (sum, n) = counted.fold((0.0, 0usize), |(sum, n), e| (sum + e, n + 1));
+            let variance = sum / n.max(1) as f64;
             // Variance of rounding: step^2/12.
             let share = step * step / 12.0 / variance.max(1e-300);
             (share > COARSE).then_some((series % problem.data.outputs, step, share))

@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::super::adequacy::{Adequacy, LEVEL, SHARE};
+use super::super::adequacy::{Adequacy, SHARE};
 use super::super::data::Data;
 use super::model::Equation;
 use super::regression::Regression;
@@ -18,17 +18,17 @@ pub(crate) const IMPERFECTION: f64 = 0.1;
 
 /// Whether the rest is noise, or little beside what was found.
 pub(crate) fn holds(a: &Adequacy) -> bool {
-    a.p_value > LEVEL || a.share < SHARE || a.of_removed < IMPERFECTION
+    a.share < SHARE || a.holds()
 }
 
 /// Broken lines in rate, position, input and time, fitted beside the equation's own columns; `before` is the sum of
-/// squares without what was found.
+/// squares without what was found, if anything was.
 pub(crate) fn adequacy(
     windows: &Windows,
     data: &Data,
     equation: &Equation,
     fit: &Regression,
-    before: f64,
+    before: Option<f64>,
 ) -> Option<Adequacy> {
     let n = windows.places.len();
     let clock = |s: usize, k: usize| data.segments[s].start_time + k as f64 * data.sample_time;
@@ -68,7 +68,9 @@ pub(crate) fn adequacy(
         // The best of several families was taken (Bonferroni).
         p_value: (p_value * families.len() as f64).min(1.0),
         share,
-        of_removed: share * fit.squares / (before - fit.squares).max(1e-300),
+        of_removed: before.map_or(f64::INFINITY, |before| {
+            share * fit.squares / (before - fit.squares).max(1e-300)
+        }),
     })
 }
 
