@@ -118,7 +118,7 @@ pub fn pole_uncertainties(
 mod tests {
     use super::*;
     use crate::covariance::fixtures::{self, assert_close};
-    use nalgebra::{DMatrix, dmatrix};
+    use nalgebra::dmatrix;
 
     #[test]
     fn equals_central_differences() {

@@ -4,7 +4,7 @@ use super::candidate::cost_p_value;
 use super::data::Data;
 use super::error::IdentifyError;
 use super::fit::Fit;
-use super::method::Estimated;
+use super::method::{Estimated, Method};
 use super::options::{CovarianceKind, Options, Order, Polish};
 use super::polish::{Effort, Polished, coefficient_cost, polish};
 use super::scaling;
@@ -81,6 +81,18 @@ pub fn finish(
                 })
         }
     };
+    // Prediction error is maximum likelihood already.
+    if options.polish == Polish::Auto
+        && !options.polishes_by_default()
+        && options.method != Method::Pem
+        && !noise_free
+    {
+        explanation.push(format!(
+            "not polished: {} was asked for by name and keeps its own numbers; --polish always takes it to maximum \
+             likelihood",
+            options.own_numbers()
+        ));
+    }
     let polished_by_method = use_polish && options.method.polishes_itself();
     let polished = candidate
         .polished

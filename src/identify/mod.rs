@@ -74,4 +74,5 @@ pub use source::Source;
 pub use stochastic::Stochastic;
 pub use summary::{Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary};
 pub use varx::{Varx, varx};
+pub use warnings::of_closed_loop as warnings_of_closed_loop;
 pub use weighted::WeightedSvd;

@@ -143,6 +143,14 @@ impl Method {
         }
     }
 
+    /// Whether feedback biases the estimate.
+    pub fn open_loop_only(self) -> bool {
+        match self {
+            Self::Knudsen | Self::Subid => true,
+            Self::PbsidOpt | Self::Pem | Self::Whitening | Self::InnovationEstimation => false,
+        }
+    }
+
     /// Whether the method does this stochastic step itself, with its covariance.
     pub fn has_own(self, step: Stochastic) -> bool {
         self == Self::Knudsen && matches!(step, Stochastic::FirstColumn | Stochastic::Cholesky)

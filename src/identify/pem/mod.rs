@@ -24,7 +24,8 @@ use super::error::IdentifyError;
 use super::polish::TRIES;
 use crate::covariance::{ParameterCovariance, ParameterLayout};
 use crate::linalg::{
-    LinalgError, cholesky_upper, multiply_nt, multiply_tn, qr_r, solve_upper_transposed, svd_thin,
+    LinalgError, all_finite, cholesky_upper, multiply_nt, multiply_tn, qr_r,
+    solve_upper_transposed, svd_thin,
 };
 use crate::model::{Armax, ModelError, StateSpace};
 
@@ -188,7 +189,7 @@ impl Search<'_> {
         let not_finite = LinalgError::NotFinite {
             what: "prediction errors",
         };
-        if mean_square.iter().any(|v| !v.is_finite()) {
+        if !all_finite(&mean_square) {
             return Err(not_finite.into());
         }
         let upper = cholesky_upper(&mean_square)?;

@@ -23,7 +23,7 @@ pub use self::predictor::predictor_coefficients;
 use super::stable::{with_poles_inside, with_stable_predictor};
 use super::varx::Varx;
 use crate::covariance::{ParameterCovariance, ParameterLayout};
-use crate::linalg::{LinalgError, cholesky_upper, multiply_nt, solve_upper_transposed};
+use crate::linalg::{LinalgError, all_finite, cholesky_upper, multiply_nt, solve_upper_transposed};
 use crate::model::StateSpace;
 
 /// The iteration ends when a step promises less than this in the cost, which is in units of chi-square: the
@@ -116,7 +116,7 @@ pub fn polish(
     let mut converged = false;
     let covariance = loop {
         let jacobian = problem.jacobian(&system);
-        if jacobian.iter().any(|v| !v.is_finite()) {
+        if !all_finite(&jacobian) {
             return Err(LinalgError::NotFinite {
                 what: "Gauss-Newton step",
             });

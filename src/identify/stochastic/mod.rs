@@ -61,6 +61,14 @@ impl Stochastic {
         }
     }
 
+    /// Whether feedback biases the estimate.
+    pub fn open_loop_only(self) -> bool {
+        match self {
+            Self::Innovations => false,
+            Self::FirstColumn | Self::Cholesky => true,
+        }
+    }
+
     /// Whether [`Stochastic::propagation`] has a formula.
     pub fn has_covariance(self) -> bool {
         match self {
