@@ -248,7 +248,7 @@ fn open_loop_methods_say_so_when_the_loop_is_closed() {
 /// `--polish auto` leaves a method that was asked for by name as it is, and says how to have it polished.
 #[test]
 fn what_is_not_polished_says_so() {
-    let log = systems::knudsen_armax().record(1000, 4);
+    let log = systems::knudsen_armax().record(3000, 5);
     let explained = |options: &Options| {
         let model = identify(std::slice::from_ref(&log), options).unwrap();
         let lines = model.summary.unwrap().explanation;
