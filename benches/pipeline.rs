@@ -11,14 +11,6 @@ fn main() {
     divan::main();
 }
 
-fn columns(log: &Log) -> Vec<&[f64]> {
-    log.input_data
-        .iter()
-        .chain(&log.output_data)
-        .map(Vec::as_slice)
-        .collect()
-}
-
 #[divan::bench(args = [100_000, 1_000_000], sample_count = 5)]
 fn read_csv(bencher: Bencher, samples: usize) {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -59,7 +51,7 @@ fn recording(samples: usize) -> &'static Log {
 
 fn moments(samples: usize, past: usize) -> f64 {
     let mut accumulator = LagAccumulator::new(4, past);
-    accumulator.push(&columns(recording(samples)));
+    accumulator.push(&recording(samples).channel_data());
     let moments = accumulator.moments();
     moments.gram(past, &moments.trend(Detrend::Mean)).gram[(0, 0)]
 }
@@ -68,7 +60,7 @@ fn moments(samples: usize, past: usize) -> f64 {
 fn moments_by_panels((samples, past): (usize, usize)) -> usize {
     let mut panels = PanelQr::new(past, &[1.0; 4]);
     panels.start_experiment(&Trend::zero(4));
-    panels.push(&columns(recording(samples)));
+    panels.push(&recording(samples).channel_data());
     panels.finish().1
 }
 

@@ -2,9 +2,13 @@
 //! line: three recordings in closed loop, both weights, everything that does not depend on the state basis. The
 //! recordings hold the very samples, in shortest round-trip form.
 
+#[path = "support/command.rs"]
+mod command;
+
 use std::path::PathBuf;
 
 use assert_cmd::Command;
+use command::run;
 use innovant::covariance::{
     AsymptoticMethod, asymptotic_covariance, frequency_response_covariance,
 };
@@ -31,20 +35,6 @@ fn numbers(value: &Value) -> Vec<f64> {
         Value::Array(list) => list.iter().flat_map(numbers).collect(),
         other => vec![other.as_f64().unwrap()],
     }
-}
-
-fn run(arguments: &[&str]) -> Value {
-    let output = Command::cargo_bin("innovant")
-        .unwrap()
-        .args(arguments)
-        .output()
-        .unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    serde_json::from_slice(&output.stdout).unwrap()
 }
 
 /// Largest difference relative to the largest expected value.

@@ -8,7 +8,7 @@ use innovant::identify::{
 use innovant::linalg::{pseudo_inverse, symmetric_square_root_factor};
 use innovant::log::Log;
 use innovant::model::StateSpace;
-use innovant::moments::{LagAccumulator, RFactor, Trend};
+use innovant::moments::RFactor;
 use innovant::systems::{TestSystem, van_wingerden_one};
 use nalgebra::DMatrix;
 
@@ -24,21 +24,11 @@ struct Problem {
 
 fn problem(plant: &TestSystem, samples: usize, past: usize, future: usize, seed: u64) -> Problem {
     let log = plant.record(samples, seed);
-    let q = log.inputs.len() + log.outputs.len();
-    let columns: Vec<&[f64]> = log
-        .input_data
-        .iter()
-        .chain(&log.output_data)
-        .map(Vec::as_slice)
-        .collect();
-    let mut accumulator = LagAccumulator::new(q, past);
-    accumulator.push(&columns);
-    let gram = accumulator.moments().gram(past, &Trend::zero(q));
-    let factor = RFactor::from_gram(&gram, log.inputs.len(), &vec![1.0; q]).unwrap();
+    let factor = RFactor::of_samples(&log.channel_data(), log.inputs.len(), past).unwrap();
     let varx = varx(&factor, false).unwrap();
     let order = plant.system.states();
     let decomposition = decompose(&factor, &varx, future, Weight::Identity).unwrap();
-    let map = decomposition.state_map(order);
+    let map = decomposition.svd.state_map(order);
     let estimate = system_matrices(&factor, &varx, &decomposition, map, 1.0).unwrap();
     Problem {
         log,

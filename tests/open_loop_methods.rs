@@ -212,3 +212,55 @@ fn the_command_line_takes_the_names_and_the_document_gives_them() {
     let text = wrong.error();
     assert!(text.contains("order 3 is not possible"), "{text}");
 }
+
+/// Bias by feedback is in no covariance: it has to be said. In open loop there is nothing to say.
+#[test]
+fn open_loop_methods_say_so_when_the_loop_is_closed() {
+    let folder = Folder::new();
+    folder.recording("closed.csv", &systems::van_wingerden_one(), 2000, 1);
+    folder.recording("open.csv", &systems::two_by_two(), 2000, 1);
+    let warned = |log: &str, order: &str, extra: &[&str]| {
+        let mut line = vec!["identify", log, "--order", order, "--output", "model.json"];
+        line.extend(extra);
+        folder.run(&line).ok();
+        let model = json(&folder.join("model.json"));
+        let warnings = model["warnings"].as_array().unwrap().clone();
+        warnings
+            .iter()
+            .any(|w| w.as_str().unwrap().contains("taken in closed loop"))
+    };
+    for method in Method::all() {
+        let extra = ["--method", method.name()];
+        let biased = method.open_loop_only();
+        assert_eq!(warned("closed.csv", "4", &extra), biased, "{extra:?}");
+        assert!(!warned("open.csv", "3", &extra), "{extra:?}");
+    }
+    for step in Stochastic::all() {
+        let extra = ["--stochastic", step.name()];
+        let biased = step.open_loop_only();
+        assert_eq!(warned("closed.csv", "4", &extra), biased, "{extra:?}");
+    }
+    // Maximum likelihood has left the bias of its start behind.
+    let polished = ["--method", "subid", "--polish", "always"];
+    assert!(!warned("closed.csv", "4", &polished));
+}
+
+/// `--polish auto` leaves a method that was asked for by name as it is, and says how to have it polished.
+#[test]
+fn what_is_not_polished_says_so() {
+    let log = systems::knudsen_armax().record(3000, 5);
+    let explained = |options: &Options| {
+        let model = identify(std::slice::from_ref(&log), options).unwrap();
+        let lines = model.summary.unwrap().explanation;
+        lines.iter().any(|line| line.starts_with("not polished: "))
+    };
+    for method in Method::all() {
+        let own = !matches!(method, Method::PbsidOpt | Method::Pem);
+        assert_eq!(explained(&options(*method, 2)), own, "{}", method.name());
+        let always = Options {
+            polish: Polish::Always,
+            ..options(*method, 2)
+        };
+        assert!(!explained(&always), "{}", method.name());
+    }
+}

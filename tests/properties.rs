@@ -2,7 +2,7 @@
 //! into files or blocks; and what must be found exactly.
 
 use innovant::covariance::frequency_response_covariance;
-use innovant::identify::{Order, Polish, Weight};
+use innovant::identify::{Method, Order, Polish, Weight};
 use innovant::log::Log;
 use innovant::model::StateSpace;
 use innovant::moments::Detrend;
@@ -75,6 +75,26 @@ proptest! {
         let error = difference(&a, &b, &FREQUENCIES, scale);
         prop_assert!(error < 1e-4, "{error:e}");
         prop_assert_eq!(a.system.states(), b.system.states());
+    }
+
+    /// Knudsen's weights are made of the outputs as they are; scaling every channel to unit rms takes their units out.
+    #[test]
+    fn units_of_the_outputs_do_not_matter_to_the_deterministic_part_of_knudsen(
+        powers in prop::array::uniform4(-6.0..6.0_f64),
+    ) {
+        let log = two_by_two().record(1200, 7);
+        let mut scaled = log.clone();
+        for (column, power) in scaled.input_data.iter_mut().chain(&mut scaled.output_data).zip(powers) {
+            column.iter_mut().for_each(|value| *value *= 10_f64.powf(power));
+        }
+        for method in [Method::Knudsen, Method::Subid] {
+            let options = Options { method, ..fixed(3, 20) };
+            let a = identify(std::slice::from_ref(&log), &options).unwrap();
+            let b = identify(std::slice::from_ref(&scaled), &options).unwrap();
+            let scale = |i: usize, j: usize| 10_f64.powf(powers[2 + i] - powers[j]);
+            let error = difference(&a, &b, &[0.05, 0.3, 1.0], scale);
+            prop_assert!(error < 1e-6, "{}: {error:e}", method.name());
+        }
     }
 
     /// Order of the experiments, and of the channels.

@@ -2,7 +2,11 @@
 //! Wingerden, repaired, `default_rng(1)`, N = 2000, p = f = 10, n = 4, all columns, degrees of freedom in
 //! the innovation covariance, corrected sign. The CSV holds the very samples, in shortest round-trip form.
 
+#[path = "support/command.rs"]
+mod command;
+
 use assert_cmd::Command;
+use command::run;
 use serde_json::Value;
 
 const TOLERANCE: f64 = 1e-6;
@@ -19,20 +23,6 @@ fn close_to_digits(found: f64, expected: f64, digits: i32, what: &str) {
         error < 10_f64.powi(1 - digits),
         "{what}: {found} instead of {expected}"
     );
-}
-
-fn run(arguments: &[&str]) -> Value {
-    let output = Command::cargo_bin("innovant")
-        .unwrap()
-        .args(arguments)
-        .output()
-        .unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    serde_json::from_slice(&output.stdout).unwrap()
 }
 
 #[test]

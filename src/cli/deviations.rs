@@ -1,6 +1,6 @@
 //! Recordings as the model sees them: deviations from the operating point, known delays taken out.
 
-use crate::identify::{Aligner, IdentifiedChannel, Model, Records};
+use crate::identify::{AlignedColumns, IdentifiedChannel, Model, Records};
 use crate::log::{Log, LogError};
 use crate::moments::{Detrend, LagAccumulator, Trend};
 use crate::report::names;
@@ -48,15 +48,11 @@ impl Deviations {
             Zero::Levels => levels(model),
             Zero::Own(detrend) => {
                 let mut moments = LagAccumulator::new(columns.len(), 0);
-                moments.push(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
+                moments.push(&as_slices(&columns));
                 moments.moments().trend(detrend)
             }
         };
-        for (channel, column) in columns.iter_mut().enumerate() {
-            for (k, value) in column.iter_mut().enumerate() {
-                *value -= trend.at(channel, k);
-            }
-        }
+        trend.remove_from(&mut columns);
         let outputs = columns.split_off(model.inputs.len());
         Self {
             inputs: columns,
@@ -66,14 +62,8 @@ impl Deviations {
 
     /// Of a recording in memory, whose channels are those of the model.
     pub(super) fn of_log(log: &Log, model: &Model, zero: Zero) -> Self {
-        let mut aligned = Aligned::new(model);
-        let columns: Vec<&[f64]> = log
-            .input_data
-            .iter()
-            .chain(&log.output_data)
-            .map(Vec::as_slice)
-            .collect();
-        aligned.push(&columns);
+        let mut aligned = aligned(model);
+        aligned.push(&log.channel_data());
         Self::new(aligned.columns, model, zero)
     }
 
@@ -91,7 +81,7 @@ impl Deviations {
             if limit == 0 {
                 continue;
             }
-            let mut aligned = Aligned::new(model);
+            let mut aligned = aligned(model);
             records.read(experiment, Some(limit), &mut |block| aligned.push(block))?;
             out.push(Self::new(
                 aligned.columns,
@@ -146,27 +136,8 @@ fn levels(model: &Model) -> Trend {
     trend
 }
 
-/// Collects blocks, inputs shifted by their known delays.
-struct Aligned {
-    aligner: Aligner,
-    columns: Vec<Vec<f64>>,
-}
-
-impl Aligned {
-    fn new(model: &Model) -> Self {
-        let delays: Vec<usize> = model.inputs.iter().map(|c| c.delay).collect();
-        Self {
-            aligner: Aligner::new(&delays, model.outputs.len()),
-            columns: vec![Vec::new(); model.inputs.len() + model.outputs.len()],
-        }
-    }
-
-    fn push(&mut self, block: &[&[f64]]) {
-        let columns = &mut self.columns;
-        self.aligner.push(block, &mut |part| {
-            for (column, part) in columns.iter_mut().zip(part) {
-                column.extend_from_slice(part);
-            }
-        });
-    }
+/// Empty columns of the channels of a model.
+fn aligned(model: &Model) -> AlignedColumns {
+    let delays: Vec<usize> = model.inputs.iter().map(|c| c.delay).collect();
+    AlignedColumns::new(&delays, model.outputs.len())
 }

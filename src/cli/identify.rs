@@ -14,7 +14,7 @@ use super::terminal::style;
 use super::{Outcome, Verbosity};
 use crate::identify::{
     CovarianceKind, FileRecords, IdentifyError, Method, Model, Options, Order, Polish, Records,
-    Stochastic, Weight, identify_records,
+    Stochastic, Weight, identify_records, warnings_of_closed_loop,
 };
 use crate::log::{Roles, Source};
 use crate::moments::Detrend;
@@ -255,16 +255,11 @@ fn test(records: &mut dyn Records, model: &mut Model) -> anyhow::Result<Option<V
     let deviations = Deviations::of_records(records, model)?;
     match judge(model, &deviations, Relation::Estimation, None) {
         Ok(tests) => {
-            let feedback = tests.feedback.as_ref();
             if let Some(summary) = &mut model.summary
-                && summary.options.feedthrough
-                && feedback.is_some_and(|test| test.p_value < tests.level)
+                && tests.closed_loop()
             {
-                summary.warnings.push(
-                    "the recording was taken in closed loop: D is only right when the controller acts with a \
-                     delay; leave out --feedthrough when it does not"
-                        .to_owned(),
-                );
+                let found = warnings_of_closed_loop(summary);
+                summary.warnings.extend(found);
             }
             Ok(Some(tests))
         }

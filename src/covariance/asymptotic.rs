@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 
 use super::error::CovarianceError;
 use super::nested::NestedErrors;
-use super::parameters::{ParameterCovariance, ParameterLayout};
+use super::parameters::ParameterCovariance;
 use super::subspace::subspace_covariance;
 use crate::identify::{Estimate, Prediction, Varx, Weight};
 use crate::linalg::{
@@ -141,18 +141,11 @@ pub fn asymptotic_covariance(
                 past,
                 feedthrough: false,
             };
-            let parameters = errors.propagation()?.parameters;
-            let matrix = multiply_nt(&parameters, &parameters);
-            Ok(ParameterCovariance {
-                layout: ParameterLayout {
-                    states: n,
-                    inputs,
-                    outputs,
-                    feedthrough: false,
-                },
-                matrix: (&matrix + matrix.transpose()) * 0.5,
-                degrees_of_freedom: None,
-            })
+            let found = errors.propagation()?;
+            Ok(ParameterCovariance::of_root(
+                found.layout,
+                &found.parameters,
+            ))
         }
     }
 }

@@ -19,14 +19,24 @@ fn with_covariance(
     feedthrough: bool,
     scale: f64,
 ) -> (StateSpace, ParameterCovariance) {
-    let layout = ParameterLayout {
-        states: system.states(),
-        inputs: system.inputs(),
-        outputs: system.outputs(),
-        feedthrough,
-    };
+    let layout = ParameterLayout::of(&system, feedthrough);
     let matrix = positive_definite(layout.len(), scale);
     let covariance = ParameterCovariance::new(layout, matrix, None).unwrap();
+    (system, covariance)
+}
+
+/// No state: `y = 2 u`, the gain with the given variance.
+pub(crate) fn static_gain(variance: f64) -> (StateSpace, ParameterCovariance) {
+    let system = StateSpace::deterministic(
+        DMatrix::zeros(0, 0),
+        DMatrix::zeros(0, 1),
+        DMatrix::zeros(1, 0),
+        dmatrix![2.0],
+        1.0,
+    )
+    .unwrap();
+    let layout = ParameterLayout::of(&system, true);
+    let covariance = ParameterCovariance::new(layout, dmatrix![variance], None).unwrap();
     (system, covariance)
 }
 

@@ -143,21 +143,7 @@ mod tests {
 
     #[test]
     fn a_static_model_has_the_covariance_of_its_feedthrough() {
-        let system = StateSpace::deterministic(
-            DMatrix::zeros(0, 0),
-            DMatrix::zeros(0, 1),
-            DMatrix::zeros(1, 0),
-            nalgebra::dmatrix![2.0],
-            1.0,
-        )
-        .unwrap();
-        let layout = super::super::parameters::ParameterLayout {
-            states: 0,
-            inputs: 1,
-            outputs: 1,
-            feedthrough: true,
-        };
-        let covariance = ParameterCovariance::new(layout, nalgebra::dmatrix![0.25], None).unwrap();
+        let (system, covariance) = fixtures::static_gain(0.25);
         let c = frequency_response_covariance(&system, &covariance, 1.0).unwrap();
         assert_eq!(c[(0, 0)], [[0.25, 0.0], [0.0, 0.0]]);
     }

@@ -14,7 +14,7 @@ use num_complex::Complex64;
 
 use super::error::CovarianceError;
 use super::parameters::{ParameterCovariance, ParameterLayout};
-use crate::linalg::multiply;
+use crate::linalg::{all_finite, multiply};
 use crate::model::StateSpace;
 
 /// The vectors of the differential above; an empty one stands for zero.
@@ -87,7 +87,7 @@ impl ParameterCovariance {
                 parameters,
             });
         }
-        if self.matrix.iter().any(|v| !v.is_finite()) {
+        if !all_finite(&self.matrix) {
             return Err(CovarianceError::NotFinite);
         }
         Ok(())

@@ -344,23 +344,9 @@ mod tests {
 
     #[test]
     fn static_models_and_models_without_input() {
-        let gain = StateSpace::deterministic(
-            DMatrix::zeros(0, 0),
-            DMatrix::zeros(0, 1),
-            DMatrix::zeros(1, 0),
-            dmatrix![2.0],
-            1.0,
-        )
-        .unwrap();
+        let (gain, covariance) = fixtures::static_gain(1e-4);
         let found = all(&gain, None, &[0.1]);
         assert_eq!(found.static_gain[0].value, Some(2.0));
-        let layout = crate::covariance::ParameterLayout {
-            states: 0,
-            inputs: 1,
-            outputs: 1,
-            feedthrough: true,
-        };
-        let covariance = ParameterCovariance::new(layout, dmatrix![1e-4], None).unwrap();
         let found = all(&gain, Some(&covariance), &[0.1]);
         assert!((found.static_gain[0].standard_deviation.unwrap() - 0.01).abs() < 1e-12);
 
@@ -379,7 +365,7 @@ mod tests {
         // Layout without feedthrough and without states has no parameter at all.
         let empty = crate::covariance::ParameterLayout {
             feedthrough: false,
-            ..layout
+            ..covariance.layout
         };
         let nothing = ParameterCovariance::new(empty, DMatrix::zeros(0, 0), None).unwrap();
         assert_eq!(

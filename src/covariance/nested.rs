@@ -68,15 +68,6 @@ pub(crate) fn newest_first(blocks: usize, channels: usize, direct: usize) -> Vec
 }
 
 impl NestedErrors<'_> {
-    fn layout(&self) -> ParameterLayout {
-        ParameterLayout {
-            states: self.system.states(),
-            inputs: self.system.inputs(),
-            outputs: self.system.outputs(),
-            feedthrough: self.feedthrough,
-        }
-    }
-
     fn channels(&self) -> usize {
         self.system.inputs() + self.system.outputs()
     }
@@ -124,7 +115,7 @@ impl NestedErrors<'_> {
     /// # Errors
     /// [`LinalgError`] when the innovation covariance cannot be decomposed.
     pub fn propagation(&self) -> Result<Propagation, LinalgError> {
-        let layout = self.layout();
+        let layout = ParameterLayout::of(self.system, self.feedthrough);
         let (n, outputs) = (layout.states, layout.outputs);
         let q = self.channels();
         let future = self.state_map.ncols() / outputs;
@@ -179,6 +170,7 @@ impl NestedErrors<'_> {
         terms.push((first_output, identity, whole(self.output_regression)));
         let coefficients = self.coefficient_errors(&inverse, &noise);
         Ok(Propagation {
+            layout,
             parameters: collected(&terms, &inverse, &noise, layout.len()),
             coefficients,
         })

@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use crate::linalg::multiply_nt;
 use crate::model::StateSpace;
 
 /// Order of the parameters in `theta = [vec A; vec B; vec K; vec C; vec D]`, column-major, `D` only
@@ -19,6 +20,16 @@ pub struct ParameterLayout {
 }
 
 impl ParameterLayout {
+    /// Of the matrices of a system.
+    pub fn of(system: &StateSpace, feedthrough: bool) -> Self {
+        Self {
+            states: system.states(),
+            inputs: system.inputs(),
+            outputs: system.outputs(),
+            feedthrough,
+        }
+    }
+
     /// First index of `vec B`.
     pub fn b(&self) -> usize {
         self.states * self.states
@@ -112,4 +123,20 @@ pub struct ParameterCovariance {
     /// Degrees of freedom of the covariance itself: `None` for a model-based covariance (normal and
     /// chi-square quantiles), blocks - 1 for the jackknife (Student and F quantiles).
     pub degrees_of_freedom: Option<f64>,
+}
+
+impl ParameterCovariance {
+    /// A covariance from a formula, `layout.len()` square; made exactly symmetric, whatever the order of summation.
+    pub(crate) fn of_matrix(layout: ParameterLayout, matrix: &DMatrix<f64>) -> Self {
+        Self {
+            layout,
+            matrix: (matrix + matrix.transpose()) * 0.5,
+            degrees_of_freedom: None,
+        }
+    }
+
+    /// `P P'` for errors `P w` with `w` white of unit covariance: positive semidefinite by construction.
+    pub(crate) fn of_root(layout: ParameterLayout, root: &DMatrix<f64>) -> Self {
+        Self::of_matrix(layout, &multiply_nt(root, root))
+    }
 }

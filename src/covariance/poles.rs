@@ -118,7 +118,7 @@ pub fn pole_uncertainties(
 mod tests {
     use super::*;
     use crate::covariance::fixtures::{self, assert_close};
-    use nalgebra::{DMatrix, dmatrix};
+    use nalgebra::dmatrix;
 
     #[test]
     fn equals_central_differences() {
@@ -198,21 +198,7 @@ mod tests {
 
     #[test]
     fn no_states_no_poles() {
-        let system = StateSpace::deterministic(
-            DMatrix::zeros(0, 0),
-            DMatrix::zeros(0, 1),
-            DMatrix::zeros(1, 0),
-            dmatrix![2.0],
-            1.0,
-        )
-        .unwrap();
-        let layout = super::super::parameters::ParameterLayout {
-            states: 0,
-            inputs: 1,
-            outputs: 1,
-            feedthrough: true,
-        };
-        let covariance = ParameterCovariance::new(layout, dmatrix![0.25], None).unwrap();
+        let (system, covariance) = fixtures::static_gain(0.25);
         assert!(pole_uncertainties(&system, &covariance).unwrap().is_empty());
     }
 }

@@ -37,12 +37,7 @@ pub(crate) fn jacobian_with_sign(
     let system = &estimate.system;
     let (n, inputs, outputs) = (system.states(), system.inputs(), system.outputs());
     let q = inputs + outputs;
-    let layout = ParameterLayout {
-        states: n,
-        inputs,
-        outputs,
-        feedthrough: varx.feedthrough,
-    };
+    let layout = ParameterLayout::of(system, varx.feedthrough);
     let regressors = varx.regressors();
     let mut jacobian = DMatrix::zeros(layout.len(), outputs * regressors);
 
@@ -161,13 +156,7 @@ pub fn subspace_covariance(
     for whitened in whitened(&jacobian, varx)? {
         covariance += multiply_nt(&whitened, &whitened);
     }
-    // Exactly symmetric, whatever the order of summation.
-    let covariance = (&covariance + covariance.transpose()) * 0.5;
-    Ok(ParameterCovariance {
-        layout,
-        matrix: covariance,
-        degrees_of_freedom: None,
-    })
+    Ok(ParameterCovariance::of_matrix(layout, &covariance))
 }
 
 /// The errors behind [`subspace_covariance`] as a linear function of white noise, with those of the vector ARX
@@ -176,9 +165,10 @@ pub fn subspace_covariance(
 /// # Errors
 /// [`LinalgError`] when the innovation covariance cannot be decomposed.
 pub fn subspace_propagation(estimate: &Estimate, varx: &Varx) -> Result<Propagation, LinalgError> {
-    let (_, jacobian) = subspace_jacobian(estimate, varx);
+    let (layout, jacobian) = subspace_jacobian(estimate, varx);
     let of_coefficients = DMatrix::identity(jacobian.ncols(), jacobian.ncols());
     Ok(Propagation {
+        layout,
         parameters: side_by_side(&whitened(&jacobian, varx)?),
         coefficients: side_by_side(&whitened(&of_coefficients, varx)?),
     })

@@ -1,7 +1,5 @@
 //! One order, estimated, polished and tested.
 
-use std::sync::Arc;
-
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
@@ -19,7 +17,7 @@ pub struct Candidate {
     /// Order.
     pub order: usize,
     /// The estimate of the method.
-    pub estimate: Arc<dyn Estimated>,
+    pub estimate: Estimated,
     /// Maximum likelihood, when it was tried. An iteration that did not converge has still gone downhill: its
     /// cost is an upper bound of the smallest.
     pub polished: Option<Polished>,
@@ -49,19 +47,19 @@ impl Window {
     /// [`IdentifyError::SingularRegression`] for an order that the data do not support.
     pub fn candidate(
         &self,
-        decomposition: &dyn Decomposed,
+        decomposition: &Decomposed,
         order: usize,
         source: &mut Source<'_>,
     ) -> Result<Candidate, IdentifyError> {
         let estimate = decomposition.estimate(order, source)?;
         let varx = &self.windows.varx;
         let polished = if self.polish {
-            polish(estimate.system(), varx, None, self.effort).ok()
+            polish(&estimate.system, varx, None, self.effort).ok()
         } else {
             None
         };
         let innovation_covariance = &varx.innovation_covariance;
-        let best = polished.as_ref().map_or(estimate.system(), |p| &p.system);
+        let best = polished.as_ref().map_or(&estimate.system, |p| &p.system);
         let predictor =
             with_stable_predictor(best, innovation_covariance).unwrap_or_else(|| best.clone());
         let state_covariance = state_covariance(&predictor, varx);

@@ -47,6 +47,34 @@ impl Aligner {
     }
 }
 
+/// Collects what an [`Aligner`] passes on, one column a channel.
+#[derive(Debug)]
+pub struct AlignedColumns {
+    aligner: Aligner,
+    /// The samples so far.
+    pub columns: Vec<Vec<f64>>,
+}
+
+impl AlignedColumns {
+    /// `delays`: one an input; `outputs`: number of outputs, which follow the inputs.
+    pub fn new(delays: &[usize], outputs: usize) -> Self {
+        Self {
+            aligner: Aligner::new(delays, outputs),
+            columns: vec![Vec::new(); delays.len() + outputs],
+        }
+    }
+
+    /// Adds a block of samples.
+    pub fn push(&mut self, block: &[&[f64]]) {
+        let columns = &mut self.columns;
+        self.aligner.push(block, &mut |part| {
+            for (column, part) in columns.iter_mut().zip(part) {
+                column.extend_from_slice(part);
+            }
+        });
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -57,22 +85,12 @@ mod tests {
         let v: Vec<f64> = (0..20).map(|k| f64::from(k) + 100.0).collect();
         let y: Vec<f64> = (0..20).map(|k| f64::from(k) + 1000.0).collect();
         for chunk in [1, 3, 20] {
-            let mut aligner = Aligner::new(&[3, 1], 1);
-            let mut got = vec![Vec::new(); 3];
+            let mut aligned = AlignedColumns::new(&[3, 1], 1);
             for from in (0..20).step_by(chunk) {
                 let to = (from + chunk).min(20);
-                aligner.push(
-                    &[&u[from..to], &v[from..to], &y[from..to]],
-                    &mut |columns| {
-                        for (out, column) in got.iter_mut().zip(columns) {
-                            out.extend_from_slice(column);
-                        }
-                    },
-                );
+                aligned.push(&[&u[from..to], &v[from..to], &y[from..to]]);
             }
-            assert_eq!(got[0], u[..17]);
-            assert_eq!(got[1], v[2..19]);
-            assert_eq!(got[2], y[3..]);
+            assert_eq!(aligned.columns, [&u[..17], &v[2..19], &y[3..]]);
         }
     }
 }

@@ -4,7 +4,7 @@ use super::candidate::cost_p_value;
 use super::data::Data;
 use super::error::IdentifyError;
 use super::fit::Fit;
-use super::method::Estimated;
+use super::method::{Estimated, Method};
 use super::options::{CovarianceKind, Options, Order, Polish};
 use super::polish::{Effort, Polished, coefficient_cost, polish};
 use super::scaling;
@@ -81,6 +81,18 @@ pub fn finish(
                 })
         }
     };
+    // Prediction error is maximum likelihood already.
+    if options.polish == Polish::Auto
+        && !options.polishes_by_default()
+        && options.method != Method::Pem
+        && !noise_free
+    {
+        explanation.push(format!(
+            "not polished: {} was asked for by name and keeps its own numbers; --polish always takes it to maximum \
+             likelihood",
+            options.own_numbers()
+        ));
+    }
     let polished_by_method = use_polish && options.method.polishes_itself();
     let polished = candidate
         .polished
@@ -102,9 +114,9 @@ pub fn finish(
             varx.innovation_covariance.clone(),
         ),
         None => (
-            estimate.system().clone(),
-            estimate.covariance()?,
-            estimate.innovation_covariance().clone(),
+            estimate.system.clone(),
+            estimate.uncertain.covariance()?,
+            estimate.innovation_covariance.clone(),
         ),
     };
 
@@ -136,19 +148,14 @@ pub fn finish(
             source,
             options,
             &Replicated {
-                estimate: estimate.as_ref(),
+                estimate: &estimate,
                 system: &system,
                 polished: polished.is_some(),
                 past: factor.past,
             },
         );
         jackknife_blocks = Some(replicates.len());
-        let layout = ParameterLayout {
-            states: order,
-            inputs: factor.inputs,
-            outputs,
-            feedthrough: varx.feedthrough,
-        };
+        let layout = ParameterLayout::of(&system, varx.feedthrough);
         let replicates: Vec<Vec<f64>> = replicates.iter().map(|s| layout.pack(s)).collect();
         jackknife_covariance(layout, &replicates).ok_or_else(|| {
             IdentifyError::Option(format!(
@@ -205,7 +212,7 @@ pub fn finish(
         warnings: Vec::new(),
     };
     summary.warnings = warnings::of_fit(&summary, &varx, noise_free, options);
-    if polished.as_ref().is_some_and(|p| !p.converged) || !estimate.converged() {
+    if polished.as_ref().is_some_and(|p| !p.converged) || !estimate.converged {
         summary.warnings.push(warnings::not_converged());
     }
     if predictor_mirrored && !noise_free {
@@ -278,7 +285,7 @@ fn make_stable(system: &StateSpace, varx: &Varx) -> Result<Option<MadeStable>, I
 
 /// What is estimated again without each block.
 struct Replicated<'a> {
-    estimate: &'a dyn Estimated,
+    estimate: &'a Estimated,
     system: &'a StateSpace,
     polished: bool,
     past: usize,
@@ -290,7 +297,7 @@ fn replicates(source: &Source<'_>, options: &Options, of: &Replicated<'_>) -> Ve
     let window = if of.polished {
         of.past
     } else {
-        of.estimate.window()
+        of.estimate.window
     };
     source
         .factors_without_blocks(window)
@@ -302,7 +309,7 @@ fn replicates(source: &Source<'_>, options: &Options, of: &Replicated<'_>) -> Ve
                     .ok()
                     .map(|p| p.system);
             }
-            of.estimate.replicate(part).ok()
+            of.estimate.uncertain.replicate(part).ok()
         })
         .collect()
 }

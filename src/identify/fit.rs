@@ -124,7 +124,12 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
                 "past window lengthened to {wanted} so that what it cuts off no longer matters"
             ));
         }
-        selection = select(&chosen, options, &mut source)?;
+        // Of an order that is given there is nothing to select, so its proposal is final already.
+        let proposal_is_final =
+            matches!(options.order, Order::Fixed(_)) && !options.method.polishes_itself();
+        if !proposal_is_final {
+            selection = select(&chosen, options, &mut source)?;
+        }
     }
     if let Some(low) = low {
         selection.explanation = low.explanation;

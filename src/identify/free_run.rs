@@ -75,10 +75,10 @@ pub fn low_order(
     let future = horizon::future_for_order(factor.past, factor.outputs, ORDERS[0]);
     let decomposition = decompose(factor, varx, future, weight)?;
     for order in ORDERS {
-        if order > decomposition.largest_order() {
+        if order > decomposition.svd.largest_order() {
             break;
         }
-        let map = decomposition.state_map(order);
+        let map = decomposition.svd.state_map(order);
         let Ok(estimate) = system_matrices(factor, varx, &decomposition, map, sample_time) else {
             continue;
         };
@@ -137,8 +137,9 @@ fn proposal(windowed: &Windowed, options: &Options) -> Result<usize, IdentifyErr
         .future
         .unwrap_or_else(|| horizon::future_for_order_choice(factor.past, factor.outputs, largest));
     let canonical = decompose(factor, varx, future, Weight::Cva)?;
-    let correlations = order::canonical_correlations(&canonical.singular_values, factor.columns);
-    let possible = canonical.largest_order().min(future * factor.outputs);
+    let correlations =
+        order::canonical_correlations(&canonical.svd.singular_values, factor.columns);
+    let possible = canonical.svd.largest_order().min(future * factor.outputs);
     let evidence = order::singular_value_criterion(
         &correlations,
         factor.inputs,

@@ -10,6 +10,7 @@
 //! | `method` | which algorithm: one enum variant and one module each | |
 //! | `pbsid_opt` | states by a weighted singular value decomposition, system matrices by least squares | van Wingerden (24)-(34) |
 //! | `stochastic` | `K` and `Lambda` by a step of its own, for any deterministic part | |
+//! | `weighted` | the singular value decomposition that states are taken from | van Wingerden (28)-(29) |
 //! | `nested` | states from nested regressions, growing past | Chiuso & Picci; Qin & Ljung |
 //! | `knudsen` | regression of future outputs on past and future inputs; tk, tk-chol | Knudsen |
 //! | `pem` | the prediction error method in the time domain | Ljung |
@@ -54,8 +55,9 @@ mod summary;
 mod truncation;
 mod varx;
 mod warnings;
+mod weighted;
 
-pub use delay::Aligner;
+pub use delay::{AlignedColumns, Aligner};
 pub use error::IdentifyError;
 pub use fit::{Fit, fit};
 pub use method::{Method, Propagation};
@@ -72,3 +74,5 @@ pub use source::Source;
 pub use stochastic::Stochastic;
 pub use summary::{Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary};
 pub use varx::{Varx, varx};
+pub use warnings::of_closed_loop as warnings_of_closed_loop;
+pub use weighted::WeightedSvd;

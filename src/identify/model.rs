@@ -2,16 +2,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::delay::Aligner;
 use super::error::IdentifyError;
 use super::fit::{Fit, fit};
 use super::options::Options;
 use super::records::{MemoryRecords, Recording, Records};
+use super::source::deviations;
 use super::summary::Summary;
 use crate::covariance::ParameterCovariance;
 use crate::log::{Channel, Log};
 use crate::model::{StateSpace, estimate_initial_state};
-use crate::moments::Trend;
 
 /// An input or output of a model.
 #[derive(Debug, Clone, PartialEq)]
@@ -114,15 +113,9 @@ pub fn identify_records(
 }
 
 fn initial_state(records: &mut dyn Records, fit: &Fit) -> Result<DVector<f64>, IdentifyError> {
-    let columns = detrended(
-        records,
-        0,
-        &fit.delays,
-        &fit.first_trend,
-        INITIAL_STATE_SAMPLES,
-    )?;
+    let kept = records.kept_samples(0).min(INITIAL_STATE_SAMPLES);
+    let columns = deviations(records, 0, &fit.delays, &fit.first_trend, Some(kept))?;
     let (inputs, outputs) = columns.split_at(fit.system.inputs());
-
     let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
     let outputs: Vec<&[f64]> = outputs.iter().map(Vec::as_slice).collect();
     Ok(estimate_initial_state(
@@ -132,31 +125,4 @@ fn initial_state(records: &mut dyn Records, fit: &Fit) -> Result<DVector<f64>, I
         Some(&fit.innovation_covariance),
     )
     .unwrap_or_else(|_| DVector::zeros(fit.system.states())))
-}
-
-/// The first samples of an experiment as deviations from its trend, inputs aligned.
-fn detrended(
-    records: &mut dyn Records,
-    experiment: usize,
-    delays: &[usize],
-    trend: &Trend,
-    samples: usize,
-) -> Result<Vec<Vec<f64>>, IdentifyError> {
-    let channels = records.inputs().len() + records.outputs().len();
-    let mut columns = vec![Vec::new(); channels];
-    let mut aligner = Aligner::new(delays, records.outputs().len());
-    let kept = records.kept_samples(experiment).min(samples);
-    records.read(experiment, Some(kept), &mut |block| {
-        aligner.push(block, &mut |block| {
-            for (column, part) in columns.iter_mut().zip(block) {
-                column.extend_from_slice(part);
-            }
-        });
-    })?;
-    for (c, column) in columns.iter_mut().enumerate() {
-        for (k, value) in column.iter_mut().enumerate() {
-            *value -= trend.at(c, k);
-        }
-    }
-    Ok(columns)
 }

@@ -17,11 +17,12 @@
 use nalgebra::DMatrix;
 
 use super::error::IdentifyError;
-use super::pbsid_opt::{Estimate, Weight, scaled_rows, state_regressions};
+use super::pbsid_opt::{Estimate, Weight, state_regressions};
 use super::varx::{Varx, varx};
+use super::weighted::{WeightedSvd, in_users_units};
 use crate::linalg::{
     cholesky_upper, multiply, multiply_nt, multiply_tn, pseudo_inverse, reciprocal_condition_upper,
-    solve_upper, solve_upper_transposed, svd_thin,
+    solve_upper, solve_upper_transposed,
 };
 use crate::moments::RFactor;
 
@@ -185,11 +186,8 @@ pub struct NestedDecomposition {
     /// Predictions from `p` and from `p + 1` samples.
     from_past: DMatrix<f64>,
     from_longer_past: DMatrix<f64>,
-    /// `U' W`, one row a singular value.
-    weighted_left: DMatrix<f64>,
-    /// Singular values of the weighted predictions, decreasing.
-    pub singular_values: Vec<f64>,
-    columns: usize,
+    /// Of the weighted predictions.
+    pub svd: WeightedSvd,
 }
 
 /// Weighted singular value decomposition of the predictions.
@@ -202,23 +200,13 @@ pub fn decompose_nested(
     weight: Weight,
 ) -> Result<NestedDecomposition, IdentifyError> {
     let leading = &nested.leading;
-    let (q, outputs, past) = (leading.channels(), leading.outputs, leading.past);
-    let order = nested.future * outputs;
+    let (q, past) = (leading.channels(), leading.past);
+    let order = nested.future * leading.outputs;
     let from_past = nested.predictions(prediction, past);
     let past_factor = leading.r.view((0, 0), (past * q, past * q)).into_owned();
     let product = multiply_nt(&from_past, &past_factor);
     let weight_matrix = match weight {
-        Weight::Identity => {
-            // The channels are scaled: identity in the user's units is the scale of each output.
-            let scale = &leading.scale[leading.inputs..];
-            DMatrix::from_fn(
-                order,
-                order,
-                |i, j| {
-                    if i == j { scale[i % outputs] } else { 0.0 }
-                },
-            )
-        }
+        Weight::Identity => in_users_units(&leading.scale[leading.inputs..], nested.future),
         Weight::Cva => {
             let root = nested.noise_root(prediction)?;
             let mut covariance = multiply_nt(&product, &product) / nested.columns() as f64;
@@ -227,45 +215,15 @@ pub fn decompose_nested(
             solve_upper_transposed(&upper, &DMatrix::identity(order, order))
         }
     };
-    let svd = svd_thin(&multiply(&weight_matrix, &product))?;
-    let mut left = svd.u;
-    for mut column in left.column_iter_mut() {
-        // The sign of a singular vector is arbitrary: fix it, so that results are reproducible.
-        if column[column.icamax()] < 0.0 {
-            column.neg_mut();
-        }
-    }
     Ok(NestedDecomposition {
         prediction,
         from_longer_past: nested.predictions(prediction, past + 1),
         from_past,
-        weighted_left: multiply_tn(&left, &weight_matrix),
-        singular_values: svd.values.iter().copied().collect(),
-        columns: nested.columns(),
+        svd: WeightedSvd::new(&weight_matrix, &product, nested.columns())?,
     })
 }
 
 impl NestedDecomposition {
-    /// Largest order that the decomposition can give.
-    pub fn largest_order(&self) -> usize {
-        let first = self.singular_values.first().copied().unwrap_or(0.0);
-        self.singular_values
-            .iter()
-            .take_while(|&&s| s > first * 1e-12)
-            .count()
-    }
-
-    /// The map `S` (`n x f l`) from the stacked predictions to the state, scaled so that the states have unit
-    /// variance.
-    pub fn state_map(&self, order: usize) -> DMatrix<f64> {
-        scaled_rows(
-            &self.weighted_left,
-            &self.singular_values,
-            self.columns,
-            order,
-        )
-    }
-
     /// Which algorithm it is of.
     pub fn prediction(&self) -> Prediction {
         self.prediction

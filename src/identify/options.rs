@@ -97,6 +97,14 @@ impl Options {
         self.method.polishes_by_default() && self.stochastic.is_none()
     }
 
+    /// What was asked for by name, and is not polished unless that is asked for too.
+    pub(super) fn own_numbers(&self) -> String {
+        match self.stochastic {
+            Some(step) => format!("--stochastic {}", step.name()),
+            None => format!("--method {}", self.method.name()),
+        }
+    }
+
     /// Whether the covariance is, or may have to be, that of the jackknife.
     pub(super) fn may_need_blocks(&self) -> bool {
         let formula = match self.stochastic {

@@ -8,9 +8,10 @@ use nalgebra::DMatrix;
 
 use super::error::IdentifyError;
 use super::varx::Varx;
+use super::weighted::{WeightedSvd, in_users_units};
 use crate::linalg::{
-    cholesky_upper, multiply, multiply_nt, multiply_tn, pseudo_inverse, qr_thin, solve_upper,
-    solve_upper_transposed, svd_thin,
+    cholesky_upper, multiply, multiply_nt, pseudo_inverse, qr_thin, solve_upper,
+    solve_upper_transposed,
 };
 use crate::model::StateSpace;
 use crate::moments::RFactor;
@@ -36,11 +37,8 @@ pub enum Weight {
 pub struct Decomposition {
     /// `[Gamma K]`, `f l x p q` (24)-(25).
     gamma_k: DMatrix<f64>,
-    /// `U' W`, one row a singular value.
-    weighted_left: DMatrix<f64>,
-    /// Singular values of `W Gamma K Z`, decreasing.
-    pub singular_values: Vec<f64>,
-    columns: usize,
+    /// Of `W Gamma K Z`.
+    pub svd: WeightedSvd,
 }
 
 /// Stacks the vector ARX coefficients into the block upper triangular `Gamma K` of (25), `f` block rows.
@@ -72,13 +70,7 @@ pub fn decompose(
     let past_factor = factor.r.view((0, 0), (width, width)).into_owned();
     let product = multiply_nt(&gamma_k, &past_factor);
     let weight_matrix = match weight {
-        Weight::Identity => {
-            // The channels are scaled: identity in the user's units is the scale of each output.
-            let scale = &factor.scale[factor.inputs..];
-            DMatrix::from_fn(future * outputs, future * outputs, |i, j| {
-                if i == j { scale[i % outputs] } else { 0.0 }
-            })
-        }
+        Weight::Identity => in_users_units(&factor.scale[factor.inputs..], future),
         Weight::Cva => {
             let mut covariance = multiply_nt(&product, &product) / factor.columns as f64;
             for i in 0..future {
@@ -97,61 +89,17 @@ pub fn decompose(
             )
         }
     };
-    let svd = svd_thin(&multiply(&weight_matrix, &product))?;
-    let mut left = svd.u;
-    for mut column in left.column_iter_mut() {
-        // The sign of a singular vector is arbitrary: fix it, so that results are reproducible.
-        if column[column.icamax()] < 0.0 {
-            column.neg_mut();
-        }
-    }
     Ok(Decomposition {
         gamma_k,
-        weighted_left: multiply_tn(&left, &weight_matrix),
-        singular_values: svd.values.iter().copied().collect(),
-        columns: factor.columns,
+        svd: WeightedSvd::new(&weight_matrix, &product, factor.columns)?,
     })
 }
 
 impl Decomposition {
-    /// Largest order that the decomposition can give.
-    pub fn largest_order(&self) -> usize {
-        let first = self.singular_values.first().copied().unwrap_or(0.0);
-        self.singular_values
-            .iter()
-            .take_while(|&&s| s > first * 1e-12)
-            .count()
-    }
-
-    /// The map `S` (`n x f l`) from the stacked predicted outputs to the state, (29), scaled so that the
-    /// states have unit variance.
-    pub fn state_map(&self, order: usize) -> DMatrix<f64> {
-        scaled_rows(
-            &self.weighted_left,
-            &self.singular_values,
-            self.columns,
-            order,
-        )
-    }
-
     /// `S [Gamma K]`, `n x p q`: the state as a function of the past window.
     fn state_of_past(&self, state_map: &DMatrix<f64>) -> DMatrix<f64> {
         multiply(state_map, &self.gamma_k)
     }
-}
-
-/// The first `order` rows of `U' W`, each divided by the standard deviation of its state over the record.
-pub(super) fn scaled_rows(
-    weighted_left: &DMatrix<f64>,
-    singular_values: &[f64],
-    columns: usize,
-    order: usize,
-) -> DMatrix<f64> {
-    let mut map = weighted_left.rows(0, order).into_owned();
-    for (i, mut row) in map.row_iter_mut().enumerate() {
-        row *= (columns as f64).sqrt() / singular_values[i];
-    }
-    map
 }
 
 /// System matrices with the regression quantities that their covariance needs.

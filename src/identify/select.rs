@@ -95,8 +95,12 @@ fn select_by(
         .future
         .unwrap_or_else(|| horizon::future_for_order_choice(past, outputs, largest));
     let canonical = decompose(factor, varx, future_for_choice, Weight::Cva)?;
-    let correlations = order::canonical_correlations(&canonical.singular_values, factor.columns);
-    let possible = canonical.largest_order().min(future_for_choice * outputs);
+    let correlations =
+        order::canonical_correlations(&canonical.svd.singular_values, factor.columns);
+    let possible = canonical
+        .svd
+        .largest_order()
+        .min(future_for_choice * outputs);
     let mut evidence = order::singular_value_criterion(
         &correlations,
         factor.inputs,
@@ -152,7 +156,7 @@ fn select_by(
     Ok(Selection {
         future,
         candidate,
-        singular_values: estimator.decomposition(future)?.singular_values().to_vec(),
+        singular_values: estimator.decomposition(future)?.singular_values,
         weight,
         evidence,
         explanation,
@@ -166,7 +170,7 @@ struct Estimator<'a, 'b> {
     options: &'a Options,
     method: Method,
     source: &'a mut Source<'b>,
-    decompositions: Vec<(usize, Arc<dyn Decomposed>)>,
+    decompositions: Vec<(usize, Decomposed)>,
     candidates: Vec<Candidate>,
 }
 
@@ -195,9 +199,9 @@ impl Estimator<'_, '_> {
             .unwrap_or_else(|| self.method.future(factor.past, factor.outputs, order))
     }
 
-    fn decomposition(&mut self, future: usize) -> Result<Arc<dyn Decomposed>, IdentifyError> {
+    fn decomposition(&mut self, future: usize) -> Result<Decomposed, IdentifyError> {
         if let Some((_, known)) = self.decompositions.iter().find(|(f, _)| *f == future) {
-            return Ok(Arc::clone(known));
+            return Ok(known.clone());
         }
         let windows = Windows {
             future,
@@ -208,7 +212,7 @@ impl Estimator<'_, '_> {
             Some(step) if !self.method.has_own(step) => step.instead_of_own(own, windows),
             _ => own,
         };
-        self.decompositions.push((future, Arc::clone(&made)));
+        self.decompositions.push((future, made.clone()));
         Ok(made)
     }
 
@@ -218,7 +222,7 @@ impl Estimator<'_, '_> {
             Some(index) => index,
             None => {
                 let decomposition = self.decomposition(self.future_for(order))?;
-                let possible = decomposition.largest_order();
+                let possible = decomposition.largest_order;
                 if order > possible {
                     return Err(IdentifyError::Order {
                         order,
@@ -227,9 +231,7 @@ impl Estimator<'_, '_> {
                             .to_owned(),
                     });
                 }
-                let made = self
-                    .window
-                    .candidate(decomposition.as_ref(), order, self.source)?;
+                let made = self.window.candidate(&decomposition, order, self.source)?;
                 self.candidates.push(made);
                 self.candidates.len() - 1
             }
@@ -267,8 +269,8 @@ fn note(evidence: &mut Vec<OrderEvidence>, candidate: &Candidate, varx: &Varx) {
                 canonical_correlation: 0.0,
                 singular_value_criterion: order::penalty(
                     candidate.order,
-                    candidate.estimate.system().inputs(),
-                    candidate.estimate.system().outputs(),
+                    candidate.estimate.system.inputs(),
+                    candidate.estimate.system.outputs(),
                     varx.columns,
                 ),
                 chi_square: None,
@@ -284,7 +286,7 @@ fn note(evidence: &mut Vec<OrderEvidence>, candidate: &Candidate, varx: &Varx) {
     let system = candidate
         .polished
         .as_ref()
-        .map_or(candidate.estimate.system(), |p| &p.system);
+        .map_or(&candidate.estimate.system, |p| &p.system);
     entry.spectral_radius = spectral_radius(&system.a).ok();
     let Some(polished) = &candidate.polished else {
         return;

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::data::Data;
-use super::delay::Aligner;
+use super::delay::AlignedColumns;
 use super::error::IdentifyError;
 use super::records::Records;
-use crate::moments::RFactor;
+use crate::moments::{RFactor, Trend};
 
 /// The recordings behind an identification. Factors come from moments that are already in memory, so asking for
 /// one costs no reading (unless the moments are too ill-conditioned, see [`RFactor`]), and each is made once.
@@ -88,23 +88,33 @@ impl<'a> Source<'a> {
     /// # Errors
     /// When reading fails.
     pub fn signals(&mut self, experiment: usize) -> Result<Vec<Vec<f64>>, IdentifyError> {
-        let channels = self.data.channels();
-        let outputs = channels - self.records.inputs().len();
-        let mut columns = vec![Vec::new(); channels];
-        let mut aligner = Aligner::new(self.data.delays(), outputs);
-        self.records.read(experiment, None, &mut |block| {
-            aligner.push(block, &mut |block| {
-                for (column, part) in columns.iter_mut().zip(block) {
-                    column.extend_from_slice(part);
-                }
-            });
-        })?;
         let trend = self.data.trend(experiment);
-        for (c, column) in columns.iter_mut().enumerate() {
-            for (k, value) in column.iter_mut().enumerate() {
-                *value = (*value - trend.at(c, k)) / self.data.scale[c];
+        let delays = self.data.delays();
+        let mut columns = deviations(self.records, experiment, delays, trend, None)?;
+        for (column, scale) in columns.iter_mut().zip(&self.data.scale) {
+            for value in column {
+                *value /= scale;
             }
         }
         Ok(columns)
     }
+}
+
+/// The first samples of an experiment (all without a limit) as deviations from a trend, inputs aligned; one column a
+/// channel, inputs then outputs.
+///
+/// # Errors
+/// When reading fails.
+pub(super) fn deviations(
+    records: &mut dyn Records,
+    experiment: usize,
+    delays: &[usize],
+    trend: &Trend,
+    limit: Option<usize>,
+) -> Result<Vec<Vec<f64>>, IdentifyError> {
+    let mut aligned = AlignedColumns::new(delays, records.outputs().len());
+    records.read(experiment, limit, &mut |block| aligned.push(block))?;
+    let mut columns = aligned.columns;
+    trend.remove_from(&mut columns);
+    Ok(columns)
 }

@@ -112,6 +112,36 @@ pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Option
     out
 }
 
+/// Warnings that follow when the residual tests find that the recordings were taken in closed loop.
+pub fn of_closed_loop(summary: &Summary) -> Vec<String> {
+    let mut out = Vec::new();
+    // The polish to maximum likelihood ends at the same model from any start; the few steps of a method that polishes
+    // itself do not leave its bias behind.
+    let kept = !summary.polished || summary.method.polishes_itself();
+    let step = summary.stochastic.filter(|step| step.open_loop_only());
+    if summary.method.open_loop_only() && kept {
+        out.push(format!(
+            "the recording was taken in closed loop, and --method {} is for open loop: the model is biased, and its \
+             uncertainty does not say so; leave out --method, or take whitening, innovation-estimation or pem",
+            summary.method.name()
+        ));
+    } else if let (Some(step), false) = (step, summary.polished) {
+        out.push(format!(
+            "the recording was taken in closed loop, and --stochastic {} is for open loop: K and the innovation \
+             covariance are biased; leave it out, or take --stochastic innovations",
+            step.name()
+        ));
+    }
+    if summary.options.feedthrough {
+        out.push(
+            "the recording was taken in closed loop: D is only right when the controller acts with a delay; leave out \
+             --feedthrough when it does not"
+                .to_owned(),
+        );
+    }
+    out
+}
+
 /// The gain `K` had to be replaced.
 pub fn predictor_mirrored() -> String {
     "the estimated predictor was unstable, so its gain K was replaced by the stable one of the same noise spectrum: \

@@ -6,6 +6,7 @@ use num_complex::Complex64;
 
 use super::error::LinalgError;
 use super::exchange::{owned, view};
+use super::finite::all_finite;
 
 /// Eigenvalues of a real matrix with right and left eigenvectors.
 #[derive(Debug, Clone)]
@@ -28,7 +29,7 @@ pub struct SymmetricEigen {
 }
 
 fn check_finite(matrix: &DMatrix<f64>, what: &'static str) -> Result<(), LinalgError> {
-    if matrix.iter().all(|v| v.is_finite()) {
+    if all_finite(matrix) {
         Ok(())
     } else {
         Err(LinalgError::NotFinite { what })

@@ -13,6 +13,7 @@
 //! | `qr` | orthogonal factorisation and least squares |
 //! | `singular` | thin singular value decomposition, pseudo-inverse |
 //! | `eigen` | ordinary, symmetric and generalised eigenvalue problems |
+//! | `finite` | whether numbers are numbers |
 //! | `logarithm` | logarithm and exponential of small matrices |
 //! | `lyapunov` | discrete Lyapunov equation, stabilising observer gain |
 //! | `riccati` | stationary Kalman filter |
@@ -21,6 +22,7 @@ mod cholesky;
 mod eigen;
 mod error;
 mod exchange;
+mod finite;
 mod logarithm;
 mod lyapunov;
 mod product;
@@ -35,6 +37,7 @@ pub use eigen::{
     symmetric_eigen,
 };
 pub use error::LinalgError;
+pub use finite::all_finite;
 pub use logarithm::{exponential, logarithm};
 pub use lyapunov::{discrete_lyapunov, stabilising_observer_gain};
 pub use product::{multiply, multiply_nt, multiply_tn};

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::error::LinalgError;
+use super::finite::all_finite;
 
 /// Doubling steps after which the iteration has failed: `2^60` steps of the filter have no more to say.
 const DOUBLINGS: usize = 60;
@@ -52,7 +53,7 @@ pub fn stationary_filter(
         let change = (&change + change.transpose()) * 0.5;
         let step_next = &scaled * &step;
         h += &change;
-        if h.iter().any(|v| !v.is_finite()) {
+        if !all_finite(&h) {
             break;
         }
         converged = change.amax() <= CONVERGED * h.amax();

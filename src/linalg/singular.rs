@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::error::LinalgError;
 use super::exchange::{owned, view};
+use super::finite::all_finite;
 
 /// Thin singular value decomposition `A = U diag(s) V'`, singular values in decreasing order.
 #[derive(Debug, Clone)]
@@ -21,7 +22,7 @@ pub struct Svd {
 /// # Errors
 /// [`LinalgError::NotFinite`] for a matrix with NaN or infinity, [`LinalgError::NoConvergence`].
 pub fn svd_thin(matrix: &DMatrix<f64>) -> Result<Svd, LinalgError> {
-    if matrix.iter().any(|v| !v.is_finite()) {
+    if !all_finite(matrix) {
         return Err(LinalgError::NotFinite {
             what: "singular value decomposition",
         });

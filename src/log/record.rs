@@ -32,6 +32,12 @@ pub struct Log {
 }
 
 impl Log {
+    /// Every channel's samples, inputs then outputs.
+    pub fn channel_data(&self) -> Vec<&[f64]> {
+        let channels = self.input_data.iter().chain(&self.output_data);
+        channels.map(Vec::as_slice).collect()
+    }
+
     /// Reads a recording with at least one input and one output.
     ///
     /// # Errors

@@ -2,7 +2,9 @@
 
 use nalgebra::DMatrix;
 
+use super::accumulator::LagAccumulator;
 use super::gram::Gram;
+use super::trend::Trend;
 use crate::linalg::{cholesky_upper, qr_r, reciprocal_condition_upper};
 
 /// Below this reciprocal condition of `R`, Cholesky on the Gram matrix loses too many digits and the
@@ -79,6 +81,24 @@ impl RFactor {
             route: Route::LagGram,
             reciprocal_condition,
         })
+    }
+
+    /// Of the samples of one recording as they are, one column a channel, inputs first: nothing removed, nothing scaled,
+    /// as in the papers.
+    ///
+    /// # Errors
+    /// As [`RFactor::from_gram`].
+    pub fn of_samples(
+        channels: &[&[f64]],
+        inputs: usize,
+        past: usize,
+    ) -> Result<Self, MomentError> {
+        let mut accumulator = LagAccumulator::new(channels.len(), past);
+        accumulator.push(channels);
+        let gram = accumulator
+            .moments()
+            .gram(past, &Trend::zero(channels.len()));
+        Self::from_gram(&gram, inputs, &vec![1.0; channels.len()])
     }
 
     /// Wraps a factor that came from orthogonal panels of data already scaled.

@@ -41,6 +41,15 @@ impl Trend {
         self.level[channel] + self.slope[channel] * k as f64
     }
 
+    /// Takes the trend out of an experiment, one column a channel, from its first sample on.
+    pub fn remove_from(&self, columns: &mut [Vec<f64>]) {
+        for (channel, column) in columns.iter_mut().enumerate() {
+            for (k, value) in column.iter_mut().enumerate() {
+                *value -= self.at(channel, k);
+            }
+        }
+    }
+
     /// Value of each channel in the middle of an experiment of `samples` samples.
     pub fn middle(&self, samples: usize) -> Vec<f64> {
         let middle = (samples.max(1) - 1) as f64 / 2.0;

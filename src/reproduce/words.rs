@@ -38,6 +38,11 @@ pub(super) fn range(values: impl IntoIterator<Item = f64>) -> String {
     format!("{} to {}", number(low, 3), number(high, 3))
 }
 
+/// A sentence on the runs that a method failed in; nothing when there are none.
+pub(super) fn failures(name: &str, failed: usize, runs: usize) -> Option<String> {
+    (failed > 0).then(|| format!("{name}: {failed} of {runs} runs failed and are left out."))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -28,6 +28,15 @@ pub(super) fn holm(p_values: &[Option<f64>], level: f64) -> Vec<bool> {
 /// Share of the level at which what is only information gets a sentence.
 const INFORMATION: f64 = 0.1;
 
+impl Validation {
+    /// Whether past residuals act on the inputs beyond doubt: the record was taken in closed loop.
+    pub fn closed_loop(&self) -> bool {
+        let limit = INFORMATION * self.level;
+        let feedback = self.feedback.as_ref();
+        feedback.is_some_and(|test| test.p_value < limit)
+    }
+}
+
 /// Decides, and fills in `rejected` and `findings`. `noise_model`: whether the model claims one.
 pub(super) fn decide(validation: &mut Validation, noise_model: bool) {
     let p = |test: &Option<ResidualTest>| test.as_ref().map(|t| t.p_value);
@@ -91,9 +100,8 @@ pub(super) fn decide(validation: &mut Validation, noise_model: bool) {
                 .to_owned(),
         );
     }
-    if let Some(test) = &validation.feedback
-        && test.p_value < INFORMATION * level
-    {
+    let closed_loop = validation.closed_loop();
+    if closed_loop {
         findings.push(
             "past residuals act on the inputs: the recording was taken in closed loop, and only past inputs \
              are tested"
@@ -105,10 +113,6 @@ pub(super) fn decide(validation: &mut Validation, noise_model: bool) {
         && let Some(strongest) = &test.strongest
     {
         // In closed loop the feedthrough of the plant and that of the controller cannot be told apart.
-        let closed_loop = validation
-            .feedback
-            .as_ref()
-            .is_some_and(|test| test.p_value < INFORMATION * level);
         let meaning = if closed_loop {
             "a controller acts without delay; the plant's own direct feedthrough, if any, cannot be told from it"
         } else {

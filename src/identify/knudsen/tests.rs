@@ -5,21 +5,11 @@ use nalgebra::DMatrix;
 use super::*;
 use crate::linalg::{cholesky_upper, spectral_radius};
 use crate::log::Log;
-use crate::moments::{Detrend, LagAccumulator, RFactor};
+use crate::moments::RFactor;
 use crate::systems;
 
 fn factor(log: &Log, window: usize) -> RFactor {
-    let channels: Vec<&[f64]> = log
-        .input_data
-        .iter()
-        .chain(&log.output_data)
-        .map(Vec::as_slice)
-        .collect();
-    let mut accumulator = LagAccumulator::new(channels.len(), window);
-    accumulator.push(&channels);
-    let moments = accumulator.moments();
-    let gram = moments.gram(window, &moments.trend(Detrend::None));
-    RFactor::from_gram(&gram, log.input_data.len(), &vec![1.0; channels.len()]).unwrap()
+    RFactor::of_samples(&log.channel_data(), log.inputs.len(), window).unwrap()
 }
 
 /// The Toeplitz matrix of definition 3.

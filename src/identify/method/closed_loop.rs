@@ -4,15 +4,15 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use super::{Decomposed, Estimated, Propagation, Windows};
-use crate::covariance::{NestedErrors, ParameterCovariance, ParameterLayout, newest_first};
+use super::{Decomposed, Estimated, Orders, Propagation, Uncertain, Windows};
+use crate::covariance::{NestedErrors, newest_first};
 use crate::identify::error::IdentifyError;
 use crate::identify::nested::{
     Nested, NestedDecomposition, Prediction, decompose_nested, nested_system_matrices,
 };
 use crate::identify::pbsid_opt::Estimate;
 use crate::identify::source::Source;
-use crate::linalg::{multiply_nt, qr_r};
+use crate::linalg::qr_r;
 use crate::model::StateSpace;
 use crate::moments::RFactor;
 
@@ -35,45 +35,45 @@ pub(super) fn decomposed(
     prediction: Prediction,
     windows: &Windows,
     source: &mut Source<'_>,
-) -> Result<Arc<dyn Decomposed>, IdentifyError> {
+) -> Result<Decomposed, IdentifyError> {
     let past = windows.factor.past;
     let factor = source.factor(past + windows.future)?;
     let nested = Nested::new(&factor, past, windows.varx.feedthrough)?;
-    Ok(Arc::new(ClosedLoop {
-        decomposition: decompose_nested(&nested, prediction, windows.weight)?,
-        nested: Arc::new(nested),
-        factor,
-        windows: windows.clone(),
-    }))
+    let decomposition = decompose_nested(&nested, prediction, windows.weight)?;
+    let svd = &decomposition.svd;
+    Ok(Decomposed::new(
+        svd.singular_values.clone(),
+        svd.largest_order(),
+        ClosedLoop {
+            decomposition,
+            nested: Arc::new(nested),
+            factor,
+            windows: windows.clone(),
+        },
+    ))
 }
 
-impl Decomposed for ClosedLoop {
-    fn singular_values(&self) -> &[f64] {
-        &self.decomposition.singular_values
-    }
-
-    fn largest_order(&self) -> usize {
-        self.decomposition.largest_order()
-    }
-
-    fn estimate(
-        &self,
-        order: usize,
-        _source: &mut Source<'_>,
-    ) -> Result<Arc<dyn Estimated>, IdentifyError> {
+impl Orders for ClosedLoop {
+    fn estimate(&self, order: usize, _: &mut Source<'_>) -> Result<Estimated, IdentifyError> {
         let estimate = nested_system_matrices(
             &self.nested,
             &self.decomposition,
-            self.decomposition.state_map(order),
+            self.decomposition.svd.state_map(order),
             self.windows.sample_time,
         )?;
-        Ok(Arc::new(OfOrder {
-            prediction: self.decomposition.prediction(),
-            windows: self.windows.clone(),
-            factor: Arc::clone(&self.factor),
-            nested: Arc::clone(&self.nested),
-            estimate,
-        }))
+        Ok(Estimated {
+            system: estimate.system.clone(),
+            innovation_covariance: self.nested.varx.innovation_covariance.clone(),
+            window: self.factor.past,
+            converged: true,
+            uncertain: Arc::new(OfOrder {
+                prediction: self.decomposition.prediction(),
+                windows: self.windows.clone(),
+                factor: Arc::clone(&self.factor),
+                nested: Arc::clone(&self.nested),
+                estimate,
+            }),
+        })
     }
 }
 
@@ -86,34 +86,7 @@ struct OfOrder {
     estimate: Estimate,
 }
 
-impl Estimated for OfOrder {
-    fn system(&self) -> &StateSpace {
-        &self.estimate.system
-    }
-
-    fn innovation_covariance(&self) -> &DMatrix<f64> {
-        &self.nested.varx.innovation_covariance
-    }
-
-    fn covariance(&self) -> Result<Option<ParameterCovariance>, IdentifyError> {
-        let system = &self.estimate.system;
-        let layout = ParameterLayout {
-            states: system.states(),
-            inputs: system.inputs(),
-            outputs: system.outputs(),
-            feedthrough: self.windows.varx.feedthrough,
-        };
-        Ok(self.propagation()?.map(|errors| {
-            let matrix = multiply_nt(&errors.parameters, &errors.parameters);
-            ParameterCovariance {
-                layout,
-                // Exactly symmetric, whatever the order of summation.
-                matrix: (&matrix + matrix.transpose()) * 0.5,
-                degrees_of_freedom: None,
-            }
-        }))
-    }
-
+impl Uncertain for OfOrder {
     fn propagation(&self) -> Result<Option<Propagation>, IdentifyError> {
         let factor = &self.factor;
         let (q, columns) = (factor.channels(), factor.columns as f64);
@@ -143,10 +116,6 @@ impl Estimated for OfOrder {
             feedthrough: self.windows.varx.feedthrough,
         };
         Ok(Some(errors.propagation()?))
-    }
-
-    fn window(&self) -> usize {
-        self.factor.past
     }
 
     /// The map to the state stays that of all data.

@@ -2,9 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use nalgebra::DMatrix;
-
-use super::{Decomposed, Estimated, Windows};
+use super::{Decomposed, Estimated, Orders, Uncertain, Windows};
 use crate::covariance::ParameterCovariance;
 use crate::identify::error::IdentifyError;
 use crate::identify::knudsen::{
@@ -54,20 +52,42 @@ struct Shared {
 pub(super) fn decomposed(
     windows: &Windows,
     source: &mut Source<'_>,
-) -> Result<Arc<dyn Decomposed>, IdentifyError> {
-    let past = windows.factor.past;
-    let regression = Regression::new(&*source.factor(past + windows.future - 1)?, past)?;
+) -> Result<Decomposed, IdentifyError> {
+    let regression = regression(windows, source)?;
+    let decomposition = Decomposition::new(&regression)?;
+    let values = &decomposition.values;
+    let first = values.first().copied().unwrap_or(0.0);
+    let seen = values
+        .iter()
+        .take_while(|v| **v > first * DEPENDENT)
+        .count();
     let step = match windows.stochastic {
         Some(Stochastic::FirstColumn) => ResidualStep::FirstColumn,
         _ => ResidualStep::Cholesky,
     };
-    Ok(Arc::new(Arc::new(Shared {
-        decomposition: Decomposition::new(&regression)?,
-        regression,
-        step,
-        windows: windows.clone(),
-        experiments: OnceLock::new(),
-    })))
+    Ok(Decomposed::new(
+        values.clone(),
+        seen.min((regression.future - 1) * regression.outputs),
+        Arc::new(Shared {
+            decomposition,
+            regression,
+            step,
+            windows: windows.clone(),
+            experiments: OnceLock::new(),
+        }),
+    ))
+}
+
+/// The regression of the future on the past of these windows.
+///
+/// # Errors
+/// [`IdentifyError`] when the recordings are too short for the windows.
+pub(super) fn regression(
+    windows: &Windows,
+    source: &mut Source<'_>,
+) -> Result<Regression, IdentifyError> {
+    let past = windows.factor.past;
+    Regression::new(&*source.factor(past + windows.future - 1)?, past)
 }
 
 /// All experiments in memory.
@@ -91,26 +111,8 @@ impl Shared {
     }
 }
 
-impl Decomposed for Arc<Shared> {
-    fn singular_values(&self) -> &[f64] {
-        &self.decomposition.values
-    }
-
-    fn largest_order(&self) -> usize {
-        let values = &self.decomposition.values;
-        let first = values.first().copied().unwrap_or(0.0);
-        let seen = values
-            .iter()
-            .take_while(|v| **v > first * DEPENDENT)
-            .count();
-        seen.min((self.regression.future - 1) * self.regression.outputs)
-    }
-
-    fn estimate(
-        &self,
-        order: usize,
-        source: &mut Source<'_>,
-    ) -> Result<Arc<dyn Estimated>, IdentifyError> {
+impl Orders for Arc<Shared> {
+    fn estimate(&self, order: usize, source: &mut Source<'_>) -> Result<Estimated, IdentifyError> {
         let windows = &self.windows;
         let feedthrough = windows.varx.feedthrough;
         let made = knudsen(
@@ -134,12 +136,22 @@ impl Decomposed for Arc<Shared> {
         } else {
             None
         };
-        Ok(Arc::new(OfOrder {
-            shared: Arc::clone(self),
-            made,
-            improved,
-            experiments,
-        }))
+        let (system, innovation_covariance) = match &improved {
+            Some(p) => (&p.system, &p.innovation_covariance),
+            None => (&made.system, &made.innovation_covariance),
+        };
+        Ok(Estimated {
+            system: system.clone(),
+            innovation_covariance: innovation_covariance.clone(),
+            window: self.regression.past + self.regression.future - 1,
+            converged: true,
+            uncertain: Arc::new(OfOrder {
+                shared: Arc::clone(self),
+                made,
+                improved,
+                experiments,
+            }),
+        })
     }
 }
 
@@ -151,21 +163,7 @@ struct OfOrder {
     experiments: Arc<Experiments>,
 }
 
-impl Estimated for OfOrder {
-    fn system(&self) -> &StateSpace {
-        self.improved
-            .as_ref()
-            .map_or(&self.made.system, |p| &p.system)
-    }
-
-    fn innovation_covariance(&self) -> &DMatrix<f64> {
-        self.improved
-            .as_ref()
-            .map_or(&self.made.innovation_covariance, |p| {
-                &p.innovation_covariance
-            })
-    }
-
+impl Uncertain for OfOrder {
     /// By the delta method from the influence of every window; after the Gauss-Newton step the inverse information.
     fn covariance(&self) -> Result<Option<ParameterCovariance>, IdentifyError> {
         if let Some(improved) = &self.improved {
@@ -200,17 +198,12 @@ impl Estimated for OfOrder {
         Ok(Some(influence.finish()?.parameters))
     }
 
-    fn window(&self) -> usize {
-        let regression = &self.shared.regression;
-        regression.past + regression.future - 1
-    }
-
     fn replicate(&self, factor: &RFactor) -> Result<StateSpace, IdentifyError> {
         let shared = &self.shared;
         let feedthrough = shared.windows.varx.feedthrough;
-        if self.improved.is_some() {
+        if let Some(improved) = &self.improved {
             let varx = varx(&factor.leading(shared.regression.past), feedthrough)?;
-            return Ok(polish(self.system(), &varx, None, Effort::Full)?.system);
+            return Ok(polish(&improved.system, &varx, None, Effort::Full)?.system);
         }
         let regression = Regression::new(factor, shared.regression.past)?;
         let decomposition = Decomposition::new(&regression)?;

@@ -1,7 +1,7 @@
 //! Methods: from the data of one past and one future window to a model of a given order.
 //!
-//! A method is one variant of [`Method`] and one module with two types: what all orders share
-//! ([`Decomposed`]) and what one order gives ([`Estimated`]). Everything else (windows, order, the chi-square
+//! A method is one variant of [`Method`] and one module that makes what all orders share ([`Decomposed`]) and what one
+//! order gives ([`Estimated`]). Everything else (windows, order, the chi-square
 //! referee, the polish, stability, the jackknife, units, documents) is the same for all of them.
 //!
 //! | file | method | source |
@@ -31,7 +31,7 @@ use super::pbsid_opt::Weight;
 use super::source::Source;
 use super::stochastic::Stochastic;
 use super::varx::Varx;
-use crate::covariance::ParameterCovariance;
+use crate::covariance::{ParameterCovariance, ParameterLayout};
 use crate::model::StateSpace;
 use crate::moments::RFactor;
 
@@ -143,12 +143,20 @@ impl Method {
         }
     }
 
+    /// Whether feedback biases the estimate.
+    pub fn open_loop_only(self) -> bool {
+        match self {
+            Self::Knudsen | Self::Subid => true,
+            Self::PbsidOpt | Self::Pem | Self::Whitening | Self::InnovationEstimation => false,
+        }
+    }
+
     /// Whether the method does this stochastic step itself, with its covariance.
     pub fn has_own(self, step: Stochastic) -> bool {
         self == Self::Knudsen && matches!(step, Stochastic::FirstColumn | Stochastic::Cholesky)
     }
 
-    /// Whether [`Estimated::covariance`] has a formula.
+    /// Whether [`Uncertain::covariance`] has a formula.
     pub fn has_covariance(self) -> bool {
         match self {
             Self::PbsidOpt
@@ -160,7 +168,7 @@ impl Method {
         }
     }
 
-    /// Whether [`Estimated::propagation`] has a formula, which a stochastic step of another method builds on.
+    /// Whether [`Uncertain::propagation`] has a formula, which a stochastic step of another method builds on.
     pub fn has_propagation(self) -> bool {
         match self {
             Self::PbsidOpt | Self::Whitening | Self::InnovationEstimation => true,
@@ -198,7 +206,7 @@ impl Method {
         self,
         windows: &Windows,
         source: &mut Source<'_>,
-    ) -> Result<Arc<dyn Decomposed>, IdentifyError> {
+    ) -> Result<Decomposed, IdentifyError> {
         match self {
             Self::PbsidOpt => pbsid_opt::decomposed(windows),
             Self::Whitening => closed_loop::decomposed(Prediction::Whitening, windows, source),
@@ -234,39 +242,68 @@ pub struct Windows {
 }
 
 /// What all orders of one past and one future window share.
-pub trait Decomposed: Debug + Send + Sync {
+#[derive(Debug, Clone)]
+pub struct Decomposed {
     /// Singular values of the weighted product, decreasing.
-    fn singular_values(&self) -> &[f64];
-
+    pub singular_values: Vec<f64>,
     /// Largest order that the decomposition can give.
-    fn largest_order(&self) -> usize;
+    pub largest_order: usize,
+    orders: Arc<dyn Orders>,
+}
+
+impl Decomposed {
+    /// What the decomposition shows, and how one order is estimated from it.
+    pub fn new(
+        singular_values: Vec<f64>,
+        largest_order: usize,
+        orders: impl Orders + 'static,
+    ) -> Self {
+        Self {
+            singular_values,
+            largest_order,
+            orders: Arc::new(orders),
+        }
+    }
 
     /// The model of one order, in scaled units.
     ///
     /// # Errors
     /// [`IdentifyError::SingularRegression`] for an order that the data do not support.
-    fn estimate(
+    pub fn estimate(
         &self,
         order: usize,
         source: &mut Source<'_>,
-    ) -> Result<Arc<dyn Estimated>, IdentifyError>;
+    ) -> Result<Estimated, IdentifyError> {
+        self.orders.estimate(order, source)
+    }
+}
+
+/// How a method estimates one order.
+pub trait Orders: Debug + Send + Sync {
+    /// See [`Decomposed::estimate`].
+    ///
+    /// # Errors
+    /// [`IdentifyError::SingularRegression`] for an order that the data do not support.
+    fn estimate(&self, order: usize, source: &mut Source<'_>) -> Result<Estimated, IdentifyError>;
 }
 
 /// A model of one order, in scaled units (every channel divided by [`RFactor::scale`]).
-pub trait Estimated: Debug + Send + Sync {
+#[derive(Debug, Clone)]
+pub struct Estimated {
     /// System matrices.
-    fn system(&self) -> &StateSpace;
-
+    pub system: StateSpace,
     /// Covariance of the innovations.
-    fn innovation_covariance(&self) -> &DMatrix<f64>;
+    pub innovation_covariance: DMatrix<f64>,
+    /// Past window of the data factor that [`Uncertain::replicate`] takes.
+    pub window: usize,
+    /// Whether the estimate is what the method aims at; a search may run out of steps.
+    pub converged: bool,
+    /// Where its covariance comes from.
+    pub uncertain: Arc<dyn Uncertain>,
+}
 
-    /// Covariance of the parameters, in the basis of [`Estimated::system`]; `None` when there is no formula: the
-    /// jackknife takes its place then.
-    ///
-    /// # Errors
-    /// [`IdentifyError::Linalg`] when a factorisation fails.
-    fn covariance(&self) -> Result<Option<ParameterCovariance>, IdentifyError>;
-
+/// Where the covariance of an estimate comes from. Nothing is computed before it is asked for.
+pub trait Uncertain: Debug + Send + Sync {
     /// How the errors of the parameters follow from unit white noise, to first order, together with the errors of
     /// the vector ARX coefficients; `None` when that is not known. It gives covariances to models whose
     /// stochastic part comes from another step.
@@ -277,8 +314,15 @@ pub trait Estimated: Debug + Send + Sync {
         Ok(None)
     }
 
-    /// Past window of the data factor that [`Estimated::replicate`] takes.
-    fn window(&self) -> usize;
+    /// Covariance of the parameters, in the basis of [`Estimated::system`]; `None` when there is no formula: the
+    /// jackknife takes its place then.
+    ///
+    /// # Errors
+    /// [`IdentifyError::Linalg`] when a factorisation fails.
+    fn covariance(&self) -> Result<Option<ParameterCovariance>, IdentifyError> {
+        let errors = self.propagation()?;
+        Ok(errors.map(|e| ParameterCovariance::of_root(e.layout, &e.parameters)))
+    }
 
     /// The model of other data (a factor of window [`Estimated::window`]) in the same state basis, for the
     /// jackknife.
@@ -286,16 +330,13 @@ pub trait Estimated: Debug + Send + Sync {
     /// # Errors
     /// [`IdentifyError`] when those data do not allow it.
     fn replicate(&self, factor: &RFactor) -> Result<StateSpace, IdentifyError>;
-
-    /// Whether the estimate is what the method aims at; a search may run out of steps.
-    fn converged(&self) -> bool {
-        true
-    }
 }
 
 /// First-order errors as a linear function of white noise `w` of unit covariance.
 #[derive(Debug, Clone)]
 pub struct Propagation {
+    /// How the parameters are laid out.
+    pub layout: ParameterLayout,
     /// Errors of the parameters, `theta x w`: `Cov = P P'`.
     pub parameters: DMatrix<f64>,
     /// Errors of the vector ARX coefficients, `vec` of an `l x m` matrix, in the same noise.

@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
-
-use super::{Decomposed, Estimated, Propagation, Windows};
+use super::{Decomposed, Estimated, Orders, Propagation, Uncertain, Windows};
 use crate::covariance::{ParameterCovariance, subspace_covariance, subspace_propagation};
 use crate::identify::error::IdentifyError;
 use crate::identify::pbsid_opt::{Decomposition, Estimate, decompose, system_matrices};
@@ -23,7 +21,7 @@ struct PbsidOpt {
 ///
 /// # Errors
 /// [`IdentifyError::Linalg`] when it does not converge.
-pub(super) fn decomposed(windows: &Windows) -> Result<Arc<dyn Decomposed>, IdentifyError> {
+pub(super) fn decomposed(windows: &Windows) -> Result<Decomposed, IdentifyError> {
     let Windows {
         factor,
         varx,
@@ -31,35 +29,35 @@ pub(super) fn decomposed(windows: &Windows) -> Result<Arc<dyn Decomposed>, Ident
         weight,
         ..
     } = windows;
-    Ok(Arc::new(PbsidOpt {
-        decomposition: decompose(factor, varx, *future, *weight)?,
-        windows: windows.clone(),
-    }))
+    let decomposition = decompose(factor, varx, *future, *weight)?;
+    let svd = &decomposition.svd;
+    Ok(Decomposed::new(
+        svd.singular_values.clone(),
+        svd.largest_order(),
+        PbsidOpt {
+            windows: windows.clone(),
+            decomposition,
+        },
+    ))
 }
 
-impl Decomposed for PbsidOpt {
-    fn singular_values(&self) -> &[f64] {
-        &self.decomposition.singular_values
-    }
-
-    fn largest_order(&self) -> usize {
-        self.decomposition.largest_order()
-    }
-
-    fn estimate(
-        &self,
-        order: usize,
-        _source: &mut Source<'_>,
-    ) -> Result<Arc<dyn Estimated>, IdentifyError> {
+impl Orders for PbsidOpt {
+    fn estimate(&self, order: usize, _: &mut Source<'_>) -> Result<Estimated, IdentifyError> {
         let windows = self.windows.clone();
         let estimate = system_matrices(
             &windows.factor,
             &windows.varx,
             &self.decomposition,
-            self.decomposition.state_map(order),
+            self.decomposition.svd.state_map(order),
             windows.sample_time,
         )?;
-        Ok(Arc::new(OfOrder { windows, estimate }))
+        Ok(Estimated {
+            system: estimate.system.clone(),
+            innovation_covariance: windows.varx.innovation_covariance.clone(),
+            window: windows.factor.past,
+            converged: true,
+            uncertain: Arc::new(OfOrder { windows, estimate }),
+        })
     }
 }
 
@@ -69,31 +67,16 @@ struct OfOrder {
     estimate: Estimate,
 }
 
-impl Estimated for OfOrder {
-    fn system(&self) -> &StateSpace {
-        &self.estimate.system
-    }
-
-    fn innovation_covariance(&self) -> &DMatrix<f64> {
-        &self.windows.varx.innovation_covariance
-    }
-
-    fn covariance(&self) -> Result<Option<ParameterCovariance>, IdentifyError> {
-        Ok(Some(subspace_covariance(
-            &self.estimate,
-            &self.windows.varx,
-        )?))
-    }
-
+impl Uncertain for OfOrder {
     fn propagation(&self) -> Result<Option<Propagation>, IdentifyError> {
-        Ok(Some(subspace_propagation(
-            &self.estimate,
-            &self.windows.varx,
-        )?))
+        let varx = &self.windows.varx;
+        Ok(Some(subspace_propagation(&self.estimate, varx)?))
     }
 
-    fn window(&self) -> usize {
-        self.windows.factor.past
+    /// Direction by direction of the noise: the propagation as a whole takes as many times the memory as there are outputs.
+    fn covariance(&self) -> Result<Option<ParameterCovariance>, IdentifyError> {
+        let varx = &self.windows.varx;
+        Ok(Some(subspace_covariance(&self.estimate, varx)?))
     }
 
     /// The map to the state stays that of all data.

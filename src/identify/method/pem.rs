@@ -2,10 +2,8 @@
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
-
 use super::knudsen::{experiments, slices};
-use super::{Decomposed, Estimated, Method, Windows};
+use super::{Decomposed, Estimated, Method, Orders, Uncertain, Windows};
 use crate::covariance::ParameterCovariance;
 use crate::identify::error::IdentifyError;
 use crate::identify::pem::{Form, PredictionErrorEstimate, STEPS, prediction_error_method};
@@ -20,7 +18,7 @@ use crate::moments::RFactor;
 struct Pem {
     windows: Windows,
     /// tk-chol, and PBSID_opt, which closed loops do not mislead.
-    starts: Vec<Arc<dyn Decomposed>>,
+    starts: Vec<Decomposed>,
 }
 
 /// The decompositions of the methods that the search starts from.
@@ -30,7 +28,7 @@ struct Pem {
 pub(super) fn decomposed(
     windows: &Windows,
     source: &mut Source<'_>,
-) -> Result<Arc<dyn Decomposed>, IdentifyError> {
+) -> Result<Decomposed, IdentifyError> {
     let plain = Windows {
         stochastic: None,
         polish_by_method: false,
@@ -41,30 +39,18 @@ pub(super) fn decomposed(
     if let Ok(chol) = Method::Knudsen.decompose(&plain, source) {
         starts.insert(0, chol);
     }
-    Ok(Arc::new(Pem {
-        windows: windows.clone(),
-        starts,
-    }))
+    Ok(Decomposed::new(
+        starts[0].singular_values.clone(),
+        starts.iter().map(|s| s.largest_order).max().unwrap_or(0),
+        Pem {
+            windows: windows.clone(),
+            starts,
+        },
+    ))
 }
 
-impl Decomposed for Pem {
-    fn singular_values(&self) -> &[f64] {
-        self.starts[0].singular_values()
-    }
-
-    fn largest_order(&self) -> usize {
-        self.starts
-            .iter()
-            .map(|s| s.largest_order())
-            .max()
-            .unwrap_or(0)
-    }
-
-    fn estimate(
-        &self,
-        order: usize,
-        source: &mut Source<'_>,
-    ) -> Result<Arc<dyn Estimated>, IdentifyError> {
+impl Orders for Pem {
+    fn estimate(&self, order: usize, source: &mut Source<'_>) -> Result<Estimated, IdentifyError> {
         let experiments = experiments(source)?;
         let signals = slices(&experiments);
         let feedthrough = self.windows.varx.feedthrough;
@@ -76,7 +62,7 @@ impl Decomposed for Pem {
         for start in &self.starts {
             let tried = start
                 .estimate(order, source)
-                .and_then(|estimate| search(estimate.system(), 1));
+                .and_then(|estimate| search(&estimate.system, 1));
             match tried {
                 Ok(made) if best.as_ref().is_none_or(|b| made.cost < b.cost) => best = Some(made),
                 Ok(_) => {}
@@ -93,44 +79,34 @@ impl Decomposed for Pem {
         } else {
             search(&best.system, STEPS)?
         };
-        Ok(Arc::new(OfOrder {
-            windows: self.windows.clone(),
-            estimate,
-        }))
+        Ok(Estimated {
+            system: estimate.system.clone(),
+            innovation_covariance: estimate.innovation_covariance.clone(),
+            window: self.windows.factor.past,
+            converged: estimate.converged,
+            uncertain: Arc::new(OfOrder {
+                feedthrough,
+                estimate,
+            }),
+        })
     }
 }
 
 #[derive(Debug)]
 struct OfOrder {
-    windows: Windows,
+    feedthrough: bool,
     estimate: PredictionErrorEstimate,
 }
 
-impl Estimated for OfOrder {
-    fn system(&self) -> &StateSpace {
-        &self.estimate.system
-    }
-
-    fn innovation_covariance(&self) -> &DMatrix<f64> {
-        &self.estimate.innovation_covariance
-    }
-
+impl Uncertain for OfOrder {
     fn covariance(&self) -> Result<Option<ParameterCovariance>, IdentifyError> {
         Ok(Some(self.estimate.covariance.clone()))
-    }
-
-    fn window(&self) -> usize {
-        self.windows.factor.past
     }
 
     /// The maximum-likelihood model of the vector ARX coefficients, from the model of all data: the same estimate
     /// but for what the past window cuts off.
     fn replicate(&self, factor: &RFactor) -> Result<StateSpace, IdentifyError> {
-        let varx = varx(factor, self.windows.varx.feedthrough)?;
+        let varx = varx(factor, self.feedthrough)?;
         Ok(polish(&self.estimate.system, &varx, None, Effort::Full)?.system)
-    }
-
-    fn converged(&self) -> bool {
-        self.estimate.converged
     }
 }

@@ -2,11 +2,8 @@
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
-
-use super::knudsen::in_basis_of;
-use super::{Decomposed, Estimated, Windows};
-use crate::covariance::ParameterCovariance;
+use super::knudsen::{in_basis_of, regression};
+use super::{Decomposed, Estimated, Orders, Uncertain, Windows};
 use crate::identify::baselines::{BaselineEstimate, ProjectionWeight, subid};
 use crate::identify::error::IdentifyError;
 use crate::identify::knudsen::Regression;
@@ -20,7 +17,6 @@ struct Subid {
     windows: Windows,
     regression: Regression,
     weight: ProjectionWeight,
-    singular_values: Vec<f64>,
 }
 
 /// The regression of a future as long as the past.
@@ -30,87 +26,64 @@ struct Subid {
 pub(super) fn decomposed(
     windows: &Windows,
     source: &mut Source<'_>,
-) -> Result<Arc<dyn Decomposed>, IdentifyError> {
-    let past = windows.factor.past;
-    let regression = Regression::new(&*source.factor(past + windows.future - 1)?, past)?;
+) -> Result<Decomposed, IdentifyError> {
+    let regression = regression(windows, source)?;
     let weight = match windows.weight {
         Weight::Identity => ProjectionWeight::Moesp,
         Weight::Cva => ProjectionWeight::Cva,
     };
-    let feedthrough = windows.varx.feedthrough;
-    let singular_values =
-        subid(&regression, 1, weight, feedthrough, windows.sample_time)?.singular_values;
-    Ok(Arc::new(Subid {
+    let of = Subid {
         windows: windows.clone(),
         regression,
         weight,
-        singular_values,
-    }))
+    };
+    let largest = (of.regression.future - 1) * of.regression.outputs;
+    Ok(Decomposed::new(
+        of.made(&of.regression, 1)?.singular_values,
+        largest,
+        Arc::new(of),
+    ))
 }
 
-impl Decomposed for Subid {
-    fn singular_values(&self) -> &[f64] {
-        &self.singular_values
-    }
-
-    fn largest_order(&self) -> usize {
-        (self.regression.future - 1) * self.regression.outputs
-    }
-
-    fn estimate(
+impl Subid {
+    fn made(
         &self,
+        regression: &Regression,
         order: usize,
-        _source: &mut Source<'_>,
-    ) -> Result<Arc<dyn Estimated>, IdentifyError> {
-        let windows = self.windows.clone();
-        let feedthrough = windows.varx.feedthrough;
-        let time = windows.sample_time;
-        Ok(Arc::new(OfOrder {
-            estimate: subid(&self.regression, order, self.weight, feedthrough, time)?,
-            past: self.regression.past,
-            future: self.regression.future,
-            weight: self.weight,
-            windows,
-        }))
+    ) -> Result<BaselineEstimate, IdentifyError> {
+        let feedthrough = self.windows.varx.feedthrough;
+        let time = self.windows.sample_time;
+        subid(regression, order, self.weight, feedthrough, time)
+    }
+}
+
+impl Orders for Arc<Subid> {
+    fn estimate(&self, order: usize, _: &mut Source<'_>) -> Result<Estimated, IdentifyError> {
+        let made = self.made(&self.regression, order)?;
+        Ok(Estimated {
+            system: made.system.clone(),
+            innovation_covariance: made.innovation_covariance,
+            window: self.regression.past + self.regression.future - 1,
+            converged: true,
+            uncertain: Arc::new(OfOrder {
+                method: Arc::clone(self),
+                system: made.system,
+            }),
+        })
     }
 }
 
 #[derive(Debug)]
 struct OfOrder {
-    windows: Windows,
-    estimate: BaselineEstimate,
-    past: usize,
-    future: usize,
-    weight: ProjectionWeight,
+    method: Arc<Subid>,
+    system: StateSpace,
 }
 
-impl Estimated for OfOrder {
-    fn system(&self) -> &StateSpace {
-        &self.estimate.system
-    }
-
-    fn innovation_covariance(&self) -> &DMatrix<f64> {
-        &self.estimate.innovation_covariance
-    }
-
-    fn covariance(&self) -> Result<Option<ParameterCovariance>, IdentifyError> {
-        Ok(None)
-    }
-
-    fn window(&self) -> usize {
-        self.past + self.future - 1
-    }
-
+impl Uncertain for OfOrder {
     fn replicate(&self, factor: &RFactor) -> Result<StateSpace, IdentifyError> {
-        let regression = Regression::new(factor, self.past)?;
-        let reference = &self.estimate.system;
-        let made = subid(
-            &regression,
-            reference.states(),
-            self.weight,
-            self.windows.varx.feedthrough,
-            reference.sample_time,
-        )?;
-        in_basis_of(&made.system, reference, self.future)
+        let of_all = &self.method.regression;
+        let regression = Regression::new(factor, of_all.past)?;
+        let made = self.method.made(&regression, self.system.states())?;
+        in_basis_of(&made.system, &self.system, of_all.future)
     }
 }

@@ -21,9 +21,11 @@ mod tests;
 use nalgebra::{DMatrix, DVector};
 
 use super::error::IdentifyError;
+use super::polish::TRIES;
 use crate::covariance::{ParameterCovariance, ParameterLayout};
 use crate::linalg::{
-    LinalgError, cholesky_upper, multiply_nt, multiply_tn, qr_r, solve_upper_transposed, svd_thin,
+    LinalgError, all_finite, cholesky_upper, multiply_nt, multiply_tn, qr_r,
+    solve_upper_transposed, svd_thin,
 };
 use crate::model::{Armax, ModelError, StateSpace};
 
@@ -35,20 +37,8 @@ pub const STEPS: usize = 100;
 /// The search ends when a step promises less than this in the cost, in units of chi-square: the parameters are then
 /// within a thousandth of a standard deviation of the minimum.
 const DECREASE: f64 = 1e-6;
-/// Length of a step and its Levenberg-Marquardt damping, relative to the largest singular value of the Jacobian. The
-/// first that leads down is taken.
-const TRIES: [(f64, f64); 10] = [
-    (1.0, 0.0),
-    (0.5, 0.0),
-    (0.25, 0.0),
-    (1.0, 1e-5),
-    (1.0, 1e-4),
-    (1.0, 1e-3),
-    (1.0, 1e-2),
-    (1.0, 1e-1),
-    (1.0, 1.0),
-    (0.1, 1.0),
-];
+/// Tried when none of [`TRIES`] leads down; of those the first that does is taken, for a cost here needs every sample.
+const LAST_TRY: (f64, f64) = (0.1, 1.0);
 /// Singular values of the Jacobian below this share of the largest are not determined by the data.
 const UNDETERMINED: f64 = 1e-11;
 
@@ -88,12 +78,7 @@ pub fn prediction_error_method(
     form: Form,
     steps: usize,
 ) -> Result<PredictionErrorEstimate, IdentifyError> {
-    let layout = ParameterLayout {
-        states: start.states(),
-        inputs: start.inputs(),
-        outputs: start.outputs(),
-        feedthrough,
-    };
+    let layout = ParameterLayout::of(start, feedthrough);
     let start = form.start(start).ok_or_else(|| {
         IdentifyError::Option(format!(
             "an ARMAX model has one input and one output; here are {} and {}",
@@ -125,7 +110,8 @@ pub fn prediction_error_method(
         if taken == steps {
             break (directions, linearised);
         }
-        let better = TRIES.iter().find_map(|&(length, damping)| {
+        let mut tries = TRIES.iter().chain([&LAST_TRY]);
+        let better = tries.find_map(|&(length, damping)| {
             let step: Vec<f64> = linearised
                 .step(damping)
                 .iter()
@@ -162,11 +148,7 @@ pub fn prediction_error_method(
                 coordinates,
             )
         }),
-        covariance: ParameterCovariance {
-            layout,
-            matrix: (&matrix + matrix.transpose()) * 0.5,
-            degrees_of_freedom: None,
-        },
+        covariance: ParameterCovariance::of_matrix(layout, &matrix),
         innovation_covariance: &point.mean_square * inflation,
         initial_states: point.initial_states,
         system: point.system,
@@ -207,7 +189,7 @@ impl Search<'_> {
         let not_finite = LinalgError::NotFinite {
             what: "prediction errors",
         };
-        if mean_square.iter().any(|v| !v.is_finite()) {
+        if !all_finite(&mean_square) {
             return Err(not_finite.into());
         }
         let upper = cholesky_upper(&mean_square)?;

@@ -171,19 +171,10 @@ mod tests {
     use super::*;
     use crate::systems;
 
-    fn layout(system: &StateSpace, feedthrough: bool) -> ParameterLayout {
-        ParameterLayout {
-            states: system.states(),
-            inputs: system.inputs(),
-            outputs: system.outputs(),
-            feedthrough,
-        }
-    }
-
     #[test]
     fn observer_form_directions_agree_with_finite_differences() {
         let start = systems::knudsen_bj().system.system;
-        let layout = layout(&start, true);
+        let layout = ParameterLayout::of(&start, true);
         let directions = Form::Armax.directions(&start, &layout).unwrap();
         assert_eq!(directions.ncols(), 13);
         let lambda = DMatrix::identity(1, 1);
@@ -207,7 +198,7 @@ mod tests {
     #[test]
     fn local_coordinates_leave_out_the_change_of_basis() {
         let system = systems::two_by_two().system;
-        let layout = layout(&system, false);
+        let layout = ParameterLayout::of(&system, false);
         let directions = Form::Innovation.directions(&system, &layout).unwrap();
         assert_eq!(directions.ncols(), layout.identifiable());
         // A small change of basis is across all of them.

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::covariance::ParameterLayout;
-use crate::linalg::{LinalgError, pseudo_inverse, qr_r};
+use crate::linalg::{LinalgError, all_finite, pseudo_inverse, qr_r};
 use crate::model::{ModelError, StateSpace, estimate_initial_state};
 
 /// Rows that are compressed at a time.
@@ -144,7 +144,7 @@ pub fn linearised_errors(
             x.copy_from_slice(&next);
         }
         whiten(&mut rows, whitener);
-        if rows.iter().any(|v| !v.is_finite()) {
+        if !all_finite(&rows) {
             return Err(LinalgError::NotFinite {
                 what: "prediction errors",
             });

@@ -46,12 +46,7 @@ fn gradient_agrees_with_differences_of_the_criterion() {
         (armax.record(300, 2), armax.system.system, Form::Armax, true),
     ];
     for (log, system, form, feedthrough) in cases {
-        let layout = ParameterLayout {
-            states: system.states(),
-            inputs: system.inputs(),
-            outputs: system.outputs(),
-            feedthrough,
-        };
+        let layout = ParameterLayout::of(&system, feedthrough);
         let signals = signals(&log);
         let start = form.start(&perturbed(&system, 0.01)).unwrap();
         let l = layout.outputs;

@@ -23,7 +23,7 @@ pub use self::predictor::predictor_coefficients;
 use super::stable::{with_poles_inside, with_stable_predictor};
 use super::varx::Varx;
 use crate::covariance::{ParameterCovariance, ParameterLayout};
-use crate::linalg::{LinalgError, cholesky_upper, multiply_nt, solve_upper_transposed};
+use crate::linalg::{LinalgError, all_finite, cholesky_upper, multiply_nt, solve_upper_transposed};
 use crate::model::StateSpace;
 
 /// The iteration ends when a step promises less than this in the cost, which is in units of chi-square: the
@@ -34,7 +34,7 @@ const ITERATIONS: usize = 60;
 /// Steps of which the one that decreases the cost most is taken: length of the step, and Levenberg-Marquardt
 /// damping relative to the largest singular value of the Jacobian. An order too high makes the Jacobian
 /// nearly singular, and only damping helps there.
-const TRIES: [(f64, f64); 9] = [
+pub(super) const TRIES: [(f64, f64); 9] = [
     (1.0, 0.0),
     (0.5, 0.0),
     (0.25, 0.0),
@@ -95,12 +95,7 @@ pub fn polish(
     largest_radius: Option<f64>,
     effort: Effort,
 ) -> Result<Polished, LinalgError> {
-    let layout = ParameterLayout {
-        states: start.states(),
-        inputs: start.inputs(),
-        outputs: start.outputs(),
-        feedthrough: varx.feedthrough,
-    };
+    let layout = ParameterLayout::of(start, varx.feedthrough);
     let problem = Problem::new(varx, layout)?;
     // Powers of an unstable predictor up to the past window would overflow the regression.
     let mut system =
@@ -121,7 +116,7 @@ pub fn polish(
     let mut converged = false;
     let covariance = loop {
         let jacobian = problem.jacobian(&system);
-        if jacobian.iter().any(|v| !v.is_finite()) {
+        if !all_finite(&jacobian) {
             return Err(LinalgError::NotFinite {
                 what: "Gauss-Newton step",
             });

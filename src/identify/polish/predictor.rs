@@ -17,38 +17,45 @@ pub struct Problem<'a> {
     target: DMatrix<f64>,
 }
 
-/// Powers that the predictor coefficients are made of.
-struct Powers {
-    /// `C At^i`, `i = 0 .. p-1`.
-    observability: Vec<DMatrix<f64>>,
-    /// `At^i [B~ K]`, `i = 0 .. p-1`.
-    controllability: Vec<DMatrix<f64>>,
+/// `C At^i`, `i = 0 .. p-1`.
+fn observability(system: &StateSpace, past: usize) -> Vec<DMatrix<f64>> {
+    let predictor = system.predictor_matrix();
+    let next = |row: &DMatrix<f64>| Some(row * &predictor);
+    std::iter::successors(Some(system.c.clone()), next)
+        .take(past)
+        .collect()
 }
 
-fn powers(system: &StateSpace, past: usize) -> Powers {
-    let predictor = &system.a - &system.k * &system.c;
-    let n = system.states();
-    let q = system.inputs() + system.outputs();
-    let mut input = DMatrix::zeros(n, q);
+/// `At^i [B~ K]`, `i = 0 .. p-1`.
+fn controllability(system: &StateSpace, past: usize) -> Vec<DMatrix<f64>> {
+    let predictor = system.predictor_matrix();
+    let mut input = DMatrix::zeros(system.states(), system.inputs() + system.outputs());
     input
         .columns_mut(0, system.inputs())
         .copy_from(&(&system.b - &system.k * &system.d));
     input
         .columns_mut(system.inputs(), system.outputs())
         .copy_from(&system.k);
-    let mut observability = Vec::with_capacity(past);
-    let mut controllability = Vec::with_capacity(past);
-    let mut row = system.c.clone();
-    let mut column = input;
-    for _ in 0..past {
-        let next_row = &row * &predictor;
-        let next_column = &predictor * &column;
-        observability.push(std::mem::replace(&mut row, next_row));
-        controllability.push(std::mem::replace(&mut column, next_column));
-    }
-    Powers {
-        observability,
-        controllability,
+    let next = |column: &DMatrix<f64>| Some(&predictor * column);
+    std::iter::successors(Some(input), next)
+        .take(past)
+        .collect()
+}
+
+/// The entries of matrices as series over the list, column-major entry by entry.
+fn series(list: &[DMatrix<f64>]) -> Vec<f64> {
+    let entries = list.first().map_or(0, DMatrix::len);
+    (0..entries)
+        .flat_map(|entry| list.iter().map(move |matrix| matrix[entry]))
+        .collect()
+}
+
+/// `out[i] += sum_{s+t=i-1} a[s] b[t]`.
+fn add_convolution(out: &mut [f64], a: &[f64], b: &[f64]) {
+    for (s, factor) in a.iter().enumerate() {
+        for (to, value) in out[s + 1..].iter_mut().zip(b) {
+            *to += factor * value;
+        }
     }
 }
 
@@ -57,9 +64,8 @@ pub fn predictor_coefficients(system: &StateSpace, past: usize, feedthrough: boo
     let (inputs, outputs) = (system.inputs(), system.outputs());
     let q = inputs + outputs;
     let regressors = past * q + if feedthrough { inputs } else { 0 };
-    let powers = powers(system, past);
     let mut out = DMatrix::zeros(outputs, regressors);
-    for (lag, column) in powers.controllability.iter().enumerate() {
+    for (lag, column) in controllability(system, past).iter().enumerate() {
         out.columns_mut((past - 1 - lag) * q, q)
             .copy_from(&(&system.c * column));
     }
@@ -116,36 +122,33 @@ impl<'a> Problem<'a> {
         let q = inputs + outputs;
         let past = self.varx.past;
         let regressors = self.varx.regressors();
-        let Powers {
-            observability,
-            controllability,
-        } = powers(system, past);
+        let observability = observability(system, past);
+        let controllability = controllability(system, past);
         let parameters = self.layout.len();
 
         // d C At^i [B~ K] / d At[a, b] = sum_{s+t=i-1} (C At^s)[:, a] (At^t [B~ K])[b, :], kept for all lags:
-        // entry (o, j) of lag i at ((i * q + j) * outputs + o), one column an (a, b).
-        let block = q * outputs;
-        let mut of_predictor = DMatrix::<f64>::zeros(past * block, n * n);
+        // entry (o, j) of lag i at ((j * outputs + o) * past + i), one column an (a, b). Each is a convolution of two
+        // series over the lags, written so that the inner loop runs along memory: this is most of the work.
+        let row_series = series(&observability);
+        let column_series = series(&controllability);
+        let mut of_predictor = DMatrix::<f64>::zeros(past * q * outputs, n * n);
         for b in 0..n {
             for a in 0..n {
                 let mut column = of_predictor.column_mut(a + n * b);
-                let out = column.as_mut_slice();
-                for (s, row) in observability.iter().enumerate() {
-                    for (t, input) in controllability.iter().enumerate().take(past - 1 - s) {
-                        let lag = s + t + 1;
-                        let slice = &mut out[lag * block..(lag + 1) * block];
-                        for j in 0..q {
-                            let factor = input[(b, j)];
-                            for o in 0..outputs {
-                                slice[j * outputs + o] += row[(o, a)] * factor;
-                            }
+                let mut lags = column.as_mut_slice().chunks_exact_mut(past);
+                for j in 0..q {
+                    for o in 0..outputs {
+                        if let Some(out) = lags.next() {
+                            let row = &row_series[(o + outputs * a) * past..][..past];
+                            let input = &column_series[(b + n * j) * past..][..past];
+                            add_convolution(out, row, input);
                         }
                     }
                 }
             }
         }
-        // One row a parameter and output: (parameter * outputs + o) x regressors.
-        let mut derivative = DMatrix::<f64>::zeros(parameters * outputs, regressors);
+        // One column a parameter and output: regressors x (parameter * outputs + o).
+        let mut derivative = DMatrix::<f64>::zeros(regressors, parameters * outputs);
         let column_of = |lag: usize, j: usize| (past - 1 - lag) * q + j;
         let add_predictor =
             |derivative: &mut DMatrix<f64>, parameter: usize, ab: usize, factor: f64| {
@@ -153,11 +156,12 @@ impl<'a> Problem<'a> {
                     return;
                 }
                 let column = of_predictor.column(ab);
-                for lag in 0..past {
-                    for j in 0..q {
-                        for o in 0..outputs {
-                            derivative[(parameter * outputs + o, column_of(lag, j))] +=
-                                factor * column[lag * block + j * outputs + o];
+                let mut lags = column.as_slice().chunks_exact(past);
+                for j in 0..q {
+                    for o in 0..outputs {
+                        let mut to = derivative.column_mut(parameter * outputs + o);
+                        for (lag, value) in lags.next().unwrap_or(&[]).iter().enumerate() {
+                            to[column_of(lag, j)] += factor * value;
                         }
                     }
                 }
@@ -172,7 +176,7 @@ impl<'a> Problem<'a> {
                 let parameter = self.layout.b() + a + n * j;
                 for (lag, row) in observability.iter().enumerate() {
                     for o in 0..outputs {
-                        derivative[(parameter * outputs + o, column_of(lag, j))] += row[(o, a)];
+                        derivative[(column_of(lag, j), parameter * outputs + o)] += row[(o, a)];
                     }
                 }
             }
@@ -186,10 +190,10 @@ impl<'a> Problem<'a> {
                 }
                 for (lag, row) in observability.iter().enumerate() {
                     for o in 0..outputs {
-                        derivative[(parameter * outputs + o, column_of(lag, inputs + v))] +=
+                        derivative[(column_of(lag, inputs + v), parameter * outputs + o)] +=
                             row[(o, a)];
                         for j in 0..inputs {
-                            derivative[(parameter * outputs + o, column_of(lag, j))] -=
+                            derivative[(column_of(lag, j), parameter * outputs + o)] -=
                                 row[(o, a)] * system.d[(v, j)];
                         }
                     }
@@ -205,7 +209,7 @@ impl<'a> Problem<'a> {
                 }
                 for (lag, input) in controllability.iter().enumerate() {
                     for j in 0..q {
-                        derivative[(parameter * outputs + v, column_of(lag, j))] += input[(b, j)];
+                        derivative[(column_of(lag, j), parameter * outputs + v)] += input[(b, j)];
                     }
                 }
             }
@@ -218,21 +222,26 @@ impl<'a> Problem<'a> {
                     for (lag, row) in observability.iter().enumerate() {
                         for o in 0..outputs {
                             let value: f64 = (0..n).map(|a| row[(o, a)] * system.k[(a, v)]).sum();
-                            derivative[(parameter * outputs + o, column_of(lag, j))] -= value;
+                            derivative[(column_of(lag, j), parameter * outputs + o)] -= value;
                         }
                     }
-                    derivative[(parameter * outputs + v, past * q + j)] += 1.0;
+                    derivative[(past * q + j, parameter * outputs + v)] += 1.0;
                 }
             }
         }
 
-        let weighted = multiply_nt(&derivative, &self.varx.regressor_factor);
+        let weighted = multiply(&self.varx.regressor_factor, &derivative);
         let mut out = DMatrix::zeros(outputs * regressors, parameters);
         for parameter in 0..parameters {
-            let rows = weighted.rows(parameter * outputs, outputs).into_owned();
-            let whitened = multiply(&self.whitener, &rows);
-            out.column_mut(parameter)
-                .copy_from_slice(whitened.as_slice());
+            for o in 0..outputs {
+                for v in 0..=o {
+                    let from = weighted.column(parameter * outputs + v);
+                    let whitener = self.whitener[(o, v)];
+                    for (j, value) in from.iter().enumerate() {
+                        out[(o + outputs * j, parameter)] += whitener * value;
+                    }
+                }
+            }
         }
         out
     }

@@ -28,22 +28,13 @@ const HALVINGS: usize = 12;
 /// Directions of `K` whose effect on the predictor is below this share of the largest are not determined.
 const UNDETERMINED: f64 = 1e-10;
 
-fn layout(system: &StateSpace, varx: &Varx) -> ParameterLayout {
-    ParameterLayout {
-        states: system.states(),
-        inputs: system.inputs(),
-        outputs: system.outputs(),
-        feedthrough: varx.feedthrough,
-    }
-}
-
 pub(super) fn estimate(
     deterministic: &StateSpace,
     windows: &Windows,
     factor: &RFactor,
 ) -> Result<StochasticPart, IdentifyError> {
     let varx = varx(factor, windows.varx.feedthrough)?;
-    let layout = layout(deterministic, &varx);
+    let layout = ParameterLayout::of(deterministic, varx.feedthrough);
     let problem = Problem::new(&varx, layout)?;
     let guess = StateSpace {
         k: first_guess(deterministic, &varx)?,
@@ -121,10 +112,11 @@ pub(super) fn propagation(
     varx: &Varx,
     of_method: Propagation,
 ) -> Result<Propagation, IdentifyError> {
-    let layout = layout(system, varx);
+    let layout = ParameterLayout::of(system, varx.feedthrough);
     let problem = Problem::new(varx, layout)?;
     let jacobian = problem.jacobian(system);
     let Propagation {
+        layout: _,
         mut parameters,
         coefficients,
     } = of_method;
@@ -143,6 +135,7 @@ pub(super) fn propagation(
     let gain = multiply(&pseudo_inverse(&of_gain, UNDETERMINED)?, &change);
     parameters.rows_mut(first, count).copy_from(&gain);
     Ok(Propagation {
+        layout,
         parameters,
         coefficients,
     })

@@ -13,8 +13,6 @@ mod combined;
 mod innovations;
 mod residual;
 
-use std::sync::Arc;
-
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -60,6 +58,14 @@ impl Stochastic {
             Self::Innovations => "innovations",
             Self::FirstColumn => "first-column",
             Self::Cholesky => "cholesky",
+        }
+    }
+
+    /// Whether feedback biases the estimate.
+    pub fn open_loop_only(self) -> bool {
+        match self {
+            Self::Innovations => false,
+            Self::FirstColumn | Self::Cholesky => true,
         }
     }
 
@@ -131,11 +137,7 @@ impl Stochastic {
     }
 
     /// The method whose deterministic part is `inner`, with this stochastic step in the place of its own.
-    pub fn instead_of_own(
-        self,
-        inner: Arc<dyn Decomposed>,
-        windows: Windows,
-    ) -> Arc<dyn Decomposed> {
+    pub fn instead_of_own(self, inner: Decomposed, windows: Windows) -> Decomposed {
         combined::combined(self, inner, windows)
     }
 }

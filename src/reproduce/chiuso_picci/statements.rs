@@ -21,9 +21,9 @@ pub(super) fn statements(outcomes: &[Outcome]) -> Vec<Comparison> {
         let median = |k: usize| o.percentiles[k][1] / o.truth[k];
         rows.push(Comparison::new(
             &format!("Fig. 1, {}", o.algorithm.name),
-            "mean estimated variance on the true one",
+            "the mean of the estimated variances lies on the true variance",
             format!(
-                "mean estimated / true variance {} over the eight frequencies, median {}",
+                "mean estimated / true variance {} over the eight frequencies, median estimated / true {}",
                 range(Plan::given().map(ratio)),
                 range(Plan::given().map(median))
             ),
@@ -42,9 +42,9 @@ pub(super) fn statements(outcomes: &[Outcome]) -> Vec<Comparison> {
         .collect();
     rows.push(Comparison::new(
         "Fig. 1, percentiles",
-        "true variance between the 5 % and 95 % percentiles",
+        "the true variance lies between the 5 % and 95 % percentiles of the estimated ones",
         format!(
-            "so at {} of {} points",
+            "true at {} of {} points",
             held.iter().filter(|inside| **inside).count(),
             held.len()
         ),
@@ -65,11 +65,11 @@ pub(super) fn statements(outcomes: &[Outcome]) -> Vec<Comparison> {
         "Section 5",
         "\"the variation of the estimated variance grows large as the variance itself grows\"",
         format!(
-            "correlation of the logarithms of variance and of the spread of its estimate: {}",
+            "correlation between the logarithm of the variance and that of the spread of its estimates: {}",
             range(spreads.iter().copied())
         ),
         Agreement::of_all(spreads.iter().map(|c| *c > 0.0)),
-        "positive",
+        "a positive correlation",
     ));
     rows
 }
@@ -85,9 +85,9 @@ pub(super) fn against_optimised(outcomes: &[Outcome]) -> Vec<Comparison> {
         .collect();
     vec![Comparison::new(
         "van Wingerden, footnote 1",
-        "variance of the optimised version equal to or below that of the whitening filter",
+        "the optimised version has a variance equal to or below that of the whitening filter",
         format!(
-            "whitening filter / PBSID_opt, true variances: {}",
+            "true variance of the whitening filter / of PBSID_opt: {}",
             range(ratios.iter().copied())
         ),
         Agreement::of_all(ratios.iter().map(|r| *r >= 1.0 - 1e-6)),

@@ -7,6 +7,7 @@ use crate::reproduce::error::ReproduceError;
 use crate::reproduce::figure::{Curve, Figure, Panel, Quantity, Role, Row, Table};
 use crate::reproduce::statistics::{logarithmic_grid, mean, percentiles};
 use crate::reproduce::study::{Study, successes};
+use crate::reproduce::words;
 use crate::systems::ClosedLoop;
 
 /// Points between two of the eight frequencies at which numbers are given.
@@ -199,7 +200,7 @@ impl Plan {
                 .to_owned(),
             rows_are: "Algorithm".to_owned(),
             columns: Self::given()
-                .map(|k| crate::reproduce::words::number(self.grid[k], 2))
+                .map(|k| words::number(self.grid[k], 2))
                 .collect(),
             rows,
             digits: 3,
@@ -211,12 +212,6 @@ impl Plan {
 pub(super) fn failures(outcomes: &[Outcome], runs: usize) -> Vec<String> {
     outcomes
         .iter()
-        .filter(|o| o.failed > 0)
-        .map(|o| {
-            format!(
-                "{}: {} of {runs} runs failed and are left out.",
-                o.algorithm.name, o.failed
-            )
-        })
+        .filter_map(|o| words::failures(&o.algorithm.name, o.failed, runs))
         .collect()
 }

@@ -7,6 +7,7 @@ use crate::reproduce::error::ReproduceError;
 use crate::reproduce::figure::{BarSeries, Bars, Row, Table, all_finite};
 use crate::reproduce::statistics::{mean, median, percentiles, root_mean_square};
 use crate::reproduce::study::{Study, successes};
+use crate::reproduce::words;
 use crate::systems::KnudsenExample;
 
 /// Bars beyond this many times tk-chol are cut: the paper's y-axes are "truncated" too.
@@ -206,13 +207,7 @@ impl Errors {
     pub(super) fn failures(&self, runs: usize) -> Vec<String> {
         self.outcomes
             .iter()
-            .filter(|o| o.failed > 0)
-            .map(|o| {
-                format!(
-                    "{}: {} of {runs} recordings failed and are left out.",
-                    o.method.name, o.failed
-                )
-            })
+            .filter_map(|o| words::failures(o.method.name, o.failed, runs))
             .collect()
     }
 }

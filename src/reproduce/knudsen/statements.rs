@@ -32,7 +32,7 @@ fn names(of: &Errors, which: impl IntoIterator<Item = usize>) -> String {
     let all = of.example.parameter_names();
     let chosen: Vec<String> = which.into_iter().map(|k| all[k].clone()).collect();
     match chosen.is_empty() {
-        true => "none".to_owned(),
+        true => "no parameter".to_owned(),
         false => chosen.join(", "),
     }
 }
@@ -57,7 +57,7 @@ fn printed_rms(of: &Errors) -> Comparison {
         &format!("Table 1, {}", of.example.name),
         format!("rms of tk-chol for {count} parameters"),
         format!(
-            "here / printed {}; off: {}",
+            "rms here / rms printed: {}; off by more: {}",
             range((0..count).map(ratio)),
             names(of, off.iter().copied())
         ),
@@ -80,9 +80,9 @@ fn square_root(of: &Errors) -> Comparison {
     let (with, without) = (distance(1), distance(2));
     Comparison::new(
         "(42), definition of rms",
-        "mean of squares, no root",
+        "mean of the squares, without a root",
         format!(
-            "with the root the table is met within a factor of {} on average, without within {}",
+            "with a root the printed table is met within a factor of {} on average, without it within a factor of {}",
             number(with, 3),
             number(without, 3)
         ),
@@ -91,7 +91,7 @@ fn square_root(of: &Errors) -> Comparison {
         } else {
             Agreement::Yes
         },
-        "the square root got lost",
+        "the square root was lost in print",
     )
 }
 
@@ -125,12 +125,12 @@ fn deterministic_part(of: &Errors) -> Comparison {
     Comparison::new(
         "Section 6, deterministic part",
         if expected {
-            "tk-chol the best subspace method for a and b, here only"
+            "tk-chol is the best subspace method for a and b, in this example only"
         } else {
-            "tk-chol not the best subspace method for a and b"
+            "tk-chol is not the best subspace method for a and b"
         },
         if best {
-            "best, or tied with the best, at all".to_owned()
+            "best, or tied with the best, at every parameter".to_owned()
         } else {
             format!("beaten at: {}", names(of, lost.iter().copied()))
         },
@@ -157,7 +157,7 @@ fn automatic(of: &Errors) -> Option<Comparison> {
         "Section 6, n4sid-auto",
         "automatic horizons do \"not improve performance\"",
         format!(
-            "rms with automatic / fixed horizons, c and sigma^2: {}",
+            "rms with automatic horizons / with fixed ones, for c and sigma^2: {}",
             range(ratios.iter().copied())
         ),
         Agreement::of_all(ratios.iter().map(|r| *r >= 1.0 / TIE)),
@@ -186,7 +186,7 @@ fn prediction_error(of: &Errors) -> Option<Comparison> {
         "Section 6, prediction error",
         "tk-chol \"can not compete with the best prediction error method\"",
         format!(
-            "rms of the best of {} relative to tk-chol, c and sigma^2: {}",
+            "best rms of {} / rms of tk-chol, for c and sigma^2: {}",
             methods
                 .iter()
                 .map(|m| m.method.name)
@@ -195,7 +195,7 @@ fn prediction_error(of: &Errors) -> Option<Comparison> {
             range(ratios.iter().copied())
         ),
         Agreement::of_all(ratios.iter().map(|r| *r < 1.0 / TIE)),
-        "below one at all of them",
+        "below one at every one of them",
     ))
 }
 
@@ -223,7 +223,7 @@ fn longer_past(of: &Errors) -> Option<Comparison> {
         "Section 5, larger i",
         "increasing i \"turned out to give poor performance\"",
         format!(
-            "with i = 20 and h = n + 2 the rms of c and sigma^2 is {} of that of tk-chol",
+            "with i = 20 and h = n + 2 the rms of c and sigma^2 is {} times that of tk-chol",
             range(ratios.iter().copied())
         ),
         Agreement::of_all(ratios.iter().map(|r| *r > TIE)),
@@ -241,11 +241,11 @@ fn two_steps(of: &Errors) -> Option<Comparison> {
         "Beyond the paper",
         "uncertainty reduced \"without introducing iterative minimization\"",
         format!(
-            "i = 20 and two Gauss-Newton steps: rms {} of that of tk-chol, {} of the Cramer-Rao bound",
+            "with i = 20 and two Gauss-Newton steps the rms is {} times that of tk-chol, {} times the Cramer-Rao bound",
             range(relative.iter().copied()),
             range(to_bound)
         ),
         Agreement::of_all(relative.iter().map(|r| *r < 1.0)),
-        "whether two steps improve on tk-chol at all parameters",
+        "whether two steps improve on tk-chol at every parameter",
     ))
 }

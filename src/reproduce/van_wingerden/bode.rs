@@ -9,6 +9,7 @@ use crate::covariance::{Path, response_bands, subspace_covariance};
 use crate::reproduce::error::ReproduceError;
 use crate::reproduce::figure::{Curve, Figure, Panel, Quantity, Role, Row, Table};
 use crate::reproduce::study::{Study, successes};
+use crate::reproduce::words;
 use crate::systems::TestSystem;
 use crate::{Options, identify};
 
@@ -236,13 +237,7 @@ impl Outcome {
     pub(super) fn failures(&self) -> Vec<String> {
         self.methods
             .iter()
-            .filter(|m| m.failed > 0)
-            .map(|m| {
-                format!(
-                    "{}: {} of {} runs failed and are left out.",
-                    m.name, m.failed, self.runs
-                )
-            })
+            .filter_map(|m| words::failures(m.name, m.failed, self.runs))
             .collect()
     }
 }

@@ -42,7 +42,7 @@ impl Subspace {
             &factor,
             &varx,
             &decomposition,
-            decomposition.state_map(setting.order),
+            decomposition.svd.state_map(setting.order),
             log.sample_time,
         )
         .map_err(|e| e.to_string())?;

@@ -143,7 +143,7 @@ fn printed_numbers(study: &Study) -> Result<Vec<Comparison>, ReproduceError> {
         "Table 1, C(1,1)",
         "+0.3749",
         format!(
-            "loop unstable as printed, spectral radius {}; with -0.3749 it is {}",
+            "as printed the loop is unstable, with a spectral radius of {}; with -0.3749 it is {}",
             number(radius, 4),
             number(repaired_radius, 3)
         ),
@@ -152,7 +152,7 @@ fn printed_numbers(study: &Study) -> Result<Vec<Comparison>, ReproduceError> {
         } else {
             Agreement::Misprint
         },
-        "the sign got lost",
+        "the sign was lost in print",
     );
     let predictor = repaired.system.predictor_matrix();
     let mut power = predictor.clone();
@@ -191,8 +191,8 @@ fn printed_numbers(study: &Study) -> Result<Vec<Comparison>, ReproduceError> {
         "(B.2), (B.4), sign of beta",
         "minus",
         format!(
-            "plus: along one record of {} samples the formula leaves {} of the parameters' error unexplained; with the \
-             minus {}",
+            "plus: in one record of {} samples the formula with a plus leaves {} of the parameters' error unexplained, with \
+             the minus {}",
             SIGN_CHECK.samples,
             percent(plus),
             percent(minus)
@@ -221,7 +221,7 @@ pub(super) fn bounds_and_likeness(name: &str, outcome: &Outcome) -> Vec<Comparis
             &format!("{name}, 99 % bounds"),
             "\"the bounds give realistic values\"",
             format!(
-                "predicted standard deviation {} of the Monte Carlo one; the bounds hold the truth in {}",
+                "the predicted standard deviation is {} times the Monte Carlo one; the bounds hold the truth in {} of the cases",
                 number(ratio, 3),
                 percent_with_error(bounds.linear)
             ),
@@ -232,13 +232,13 @@ pub(super) fn bounds_and_likeness(name: &str, outcome: &Outcome) -> Vec<Comparis
             &format!("{name}, the band in the figure"),
             "20 estimates around one band",
             format!(
-                "{} of the other estimates in the first run's band, {} in that of a run on average",
+                "{} of the other estimates lie in the band of the first run, on average {} in the band of a run",
                 percent(bounds.others_in_first),
                 percent(bounds.others)
             ),
             Agreement::of(bounds.others >= 0.9 * share_expected_of_others()),
             format!(
-                "two estimates differ by more than one from the truth: {} are expected; at least nine tenths of that",
+                "two estimates differ by more than one differs from the truth, so {} are expected; at least nine tenths of that",
                 percent(share_expected_of_others())
             ),
         ),
@@ -246,7 +246,7 @@ pub(super) fn bounds_and_likeness(name: &str, outcome: &Outcome) -> Vec<Comparis
             &format!("{name}, against prediction error"),
             "\"similar results are obtained\"",
             format!(
-                "rms error {} of that of the maximum-likelihood model ({} against {})",
+                "the rms error is {} times that of the maximum-likelihood model ({} against {})",
                 number(worse, 3),
                 percent(bounds.relative_error),
                 percent(polished.bounds.relative_error)

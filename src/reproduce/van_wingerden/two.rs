@@ -162,7 +162,7 @@ fn noise_row(plant: &TestSystem) -> Result<Comparison, ReproduceError> {
             number(closed, 3)
         ),
         Agreement::of((7.0..9.0).contains(&closed)),
-        "by choice of the noise, which the paper does not print",
+        "by our choice of the noise, which the paper does not print",
     ))
 }
 
@@ -183,7 +183,7 @@ fn memory_row(plant: &TestSystem) -> Result<Comparison, ReproduceError> {
         "Section 2.2, At^p = 0",
         "assumed",
         format!(
-            "spectral radius {}, so that {} of the prediction's standard deviation comes from before the window",
+            "the spectral radius is {}, so that a share of {} of the prediction's standard deviation comes from before the window",
             number(radius, 3),
             number(share, 2)
         ),
@@ -200,7 +200,7 @@ fn suitable_row(strong: &Bounds, weak: &Bounds) -> Comparison {
         "Section 5.2, a realistic complex model",
         "\"also suitable to work with a realistic complex model\"",
         format!(
-            "truth in the 99 % bound: {} where |G| is strong, {} where it is weaker than {} dB below its peak",
+            "the 99 % bound holds the truth in {} of the cases where |G| is strong, in {} where it is more than {} dB below its peak",
             percent_with_error(strong.linear),
             percent_with_error(weak.linear),
             number(-WEAK_DB, 2)
