@@ -95,6 +95,17 @@ impl Coordinates {
         }
     }
 
+    /// The same numbers free, around another plant in these coordinates.
+    pub fn around(&self, plant: Plant) -> Self {
+        Self {
+            given: plant,
+            free_rows: self.free_rows.clone(),
+            active_inputs: self.active_inputs.clone(),
+            to_here: self.to_here.clone(),
+            rows: OnceLock::new(),
+        }
+    }
+
     /// What can be read off the state of the given plant.
     pub fn given_rows(&self) -> &Functionals {
         self.rows.get_or_init(|| Functionals::new(&self.given))
@@ -248,5 +259,40 @@ impl Derivatives {
             rate_feedthrough: rows(&c * &b_c),
             integral,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows that were read off one plant are not those of another.
+    #[test]
+    fn another_plant_has_rows_of_its_own() {
+        let plant = Plant {
+            states: 2,
+            inputs: 1,
+            outputs: 1,
+            a: vec![0.9, 0.2, -0.3, 0.8],
+            b: vec![0.1, 0.5],
+            c: vec![1.0, 0.0],
+            d: vec![0.0],
+            sample_time: 0.01,
+        };
+        let coordinates = Coordinates::new(&plant);
+        let before = coordinates.given_rows().clone();
+        let mut other = coordinates.given.clone();
+        other.a[2] *= 1.5;
+        let after = coordinates.around(other.clone());
+        let signal = super::super::structure::Signal::Output(0);
+        let rate = |rows: &Functionals, plant| rows.of(plant, signal).rate;
+        assert_ne!(
+            rate(after.given_rows(), &other),
+            rate(&before, &coordinates.given)
+        );
+        assert_eq!(
+            rate(after.given_rows(), &other),
+            rate(&Functionals::new(&other), &other)
+        );
     }
 }

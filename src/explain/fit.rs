@@ -24,8 +24,8 @@ const STEPS_EACH: usize = 4;
 pub(crate) struct Effort {
     /// Rounds of noise estimation.
     pub rounds: usize,
-    /// Steps a round.
-    pub steps: usize,
+    /// Sets of derivatives a round: they are what costs, and each serves a few steps.
+    pub derivatives: usize,
     /// The deviance has settled when a step lowers it by less.
     pub settled: f64,
 }
@@ -34,19 +34,19 @@ impl Effort {
     /// To see what deserves more.
     pub const SCOUT: Self = Self {
         rounds: 1,
-        steps: 6,
+        derivatives: 2,
         settled: 0.5,
     };
     /// To rank candidates.
     pub const RANK: Self = Self {
         rounds: 2,
-        steps: 14,
+        derivatives: 5,
         settled: 0.1,
     };
     /// To report.
     pub const FINAL: Self = Self {
         rounds: 3,
-        steps: 40,
+        derivatives: 20,
         settled: 0.02,
     };
 }
@@ -214,12 +214,17 @@ impl Fit {
         let mut cost = noise.deviance(&self.residual, &problem.mask);
         let mut jacobian: Option<Jacobian> = None;
         let mut age = 0;
-        for _ in 0..effort.steps {
+        let mut taken = 0;
+        loop {
             if age >= STEPS_EACH {
                 jacobian = None;
             }
             let fresh = jacobian.is_none();
             if fresh {
+                if taken == effort.derivatives {
+                    return;
+                }
+                taken += 1;
                 age = 0;
                 jacobian = self.jacobian(problem, noise);
             }

@@ -412,8 +412,7 @@ fn learn_nonlinear(
     let initial: Vec<Vec<f64>> = (0..noise_free.segments.len())
         .map(|s| fitted.initial_state(&best.theta, s).to_vec())
         .collect();
-    let mut coordinates = (*fitted.coordinates).clone();
-    coordinates.given = fitted.plant(&best.theta);
+    let coordinates = fitted.coordinates.around(fitted.plant(&best.theta));
     let structure = Structure {
         coordinates: Arc::new(coordinates),
         plant_free: false,

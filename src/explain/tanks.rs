@@ -282,7 +282,10 @@ fn structured(
         });
     }
     let structure = Structure {
-        coordinates: Arc::new(still(data, initial.first().map_or(0, Vec::len))),
+        coordinates: Arc::new(Coordinates::fixed(
+            still(data, initial.first().map_or(0, Vec::len)),
+            vec![0],
+        )),
         plant_free: false,
         initial_free: true,
         initial,
@@ -310,9 +313,9 @@ fn structured(
     ))
 }
 
-/// Coordinates of so many states whose plant does nothing.
-fn still(data: &Data, states: usize) -> Coordinates {
-    let plant = Plant {
+/// A plant of so many states that does nothing.
+fn still(data: &Data, states: usize) -> Plant {
+    Plant {
         states,
         inputs: data.inputs,
         outputs: 1,
@@ -321,8 +324,7 @@ fn still(data: &Data, states: usize) -> Coordinates {
         c: vec![0.0; states],
         d: vec![0.0; data.inputs],
         sample_time: data.sample_time,
-    };
-    Coordinates::fixed(plant, vec![0])
+    }
 }
 
 /// What the tanks do near their mean levels at the mean input; where there is a constant input, the operating point
@@ -337,8 +339,7 @@ fn linearised(data: &Data, structure: &Structure, theta: &[f64]) -> Coordinates 
     }
     let input = sum / f64::max(n, 1.0);
     let states = structure.states();
-    let mut coordinates = still(data, states);
-    let plant = &mut coordinates.given;
+    let mut plant = still(data, states);
     let at = tanks.next(&mean, input);
     for j in 0..states {
         let step = DIFFERENCE * mean[j].max(f64::MIN_POSITIVE);
@@ -360,7 +361,7 @@ fn linearised(data: &Data, structure: &Structure, theta: &[f64]) -> Coordinates 
         }
     }
     plant.c[states - 1] = 1.0;
-    coordinates
+    Coordinates::fixed(plant, vec![0])
 }
 
 /// The levels at all samples.
