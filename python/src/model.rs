@@ -1,0 +1,261 @@
+//! The model: matrices, what it foresees, whether it holds, and its document.
+
+use innovant::identify::MemoryRecords;
+use innovant::log::Log;
+use innovant::moments::Detrend;
+use innovant::report::text::{ModelText, Style, model_text, validation_text, verdict};
+use innovant::report::{ModelDocument, parse_model, to_json};
+use innovant::validate::{
+    Deviations, Relation, TestedModel, Validation, Zero, identify_and_test, judge,
+};
+use nalgebra::DVector;
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, ToPyArray};
+use pyo3::prelude::*;
+
+use crate::arrays::{Samples, columns, matrix, recordings, samples, slices};
+use crate::errors::raise;
+use crate::options::options;
+
+/// A model with the tests of its residuals.
+#[pyclass(module = "innovant._innovant", frozen)]
+pub struct Model {
+    pub model: innovant::Model,
+    pub tests: Option<Validation>,
+}
+
+impl From<TestedModel> for Model {
+    fn from(tested: TestedModel) -> Self {
+        let TestedModel { model, tests } = tested;
+        Self { model, tests }
+    }
+}
+
+/// A matrix of a model by its letter.
+type Matrix<'py> = Bound<'py, PyArray2<f64>>;
+
+#[pymethods]
+impl Model {
+    fn a<'py>(&self, py: Python<'py>) -> Matrix<'py> {
+        matrix(py, &self.model.system.a)
+    }
+
+    fn b<'py>(&self, py: Python<'py>) -> Matrix<'py> {
+        matrix(py, &self.model.system.b)
+    }
+
+    fn c<'py>(&self, py: Python<'py>) -> Matrix<'py> {
+        matrix(py, &self.model.system.c)
+    }
+
+    fn d<'py>(&self, py: Python<'py>) -> Matrix<'py> {
+        matrix(py, &self.model.system.d)
+    }
+
+    fn k<'py>(&self, py: Python<'py>) -> Matrix<'py> {
+        matrix(py, &self.model.system.k)
+    }
+
+    fn innovation_covariance<'py>(&self, py: Python<'py>) -> Option<Matrix<'py>> {
+        let covariance = self.model.innovation_covariance.as_ref()?;
+        Some(matrix(py, covariance))
+    }
+
+    fn covariance<'py>(&self, py: Python<'py>) -> Option<Matrix<'py>> {
+        let covariance = self.model.covariance.as_ref()?;
+        Some(matrix(py, &covariance.matrix))
+    }
+
+    fn x0<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.model.initial_state.as_slice().to_pyarray(py)
+    }
+
+    fn dt(&self) -> f64 {
+        self.model.system.sample_time
+    }
+
+    /// Headers of the inputs, of the outputs.
+    fn names(&self) -> (Vec<String>, Vec<String>) {
+        let of = |channels: &[innovant::identify::IdentifiedChannel]| {
+            channels.iter().map(|c| c.channel.to_string()).collect()
+        };
+        (of(&self.model.inputs), of(&self.model.outputs))
+    }
+
+    /// Levels of the inputs, of the outputs.
+    fn levels(&self) -> (Vec<f64>, Vec<f64>) {
+        let of = |channels: &[innovant::identify::IdentifiedChannel]| {
+            channels.iter().map(|c| c.level).collect()
+        };
+        (of(&self.model.inputs), of(&self.model.outputs))
+    }
+
+    fn delays(&self) -> Vec<usize> {
+        self.model.inputs.iter().map(|c| c.delay).collect()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let summary = self.model.summary.as_ref();
+        summary.map_or_else(Vec::new, |s| s.warnings.clone())
+    }
+
+    fn verdict(&self) -> String {
+        verdict(&self.model, self.tests.as_ref())
+    }
+
+    /// The table that the command line prints.
+    fn text(&self) -> String {
+        model_text(&ModelText {
+            model: &self.model,
+            tests: self.tests.as_ref(),
+            orders: &[],
+            style: Style::UNICODE,
+        })
+    }
+
+    /// The tests of the residuals as JSON.
+    fn residual_tests(&self) -> PyResult<Option<String>> {
+        self.tests.as_ref().map(to_json).transpose().map_err(raise)
+    }
+
+    /// Free run on inputs of samples x channels.
+    fn simulate<'py>(
+        &self,
+        py: Python<'py>,
+        u: Samples<'py>,
+        x0: Option<PyReadonlyArray1<'py, f64>>,
+    ) -> PyResult<Matrix<'py>> {
+        let (inputs, start) = (columns(&u), state(x0.as_ref()));
+        let outputs = py.detach(|| {
+            let outputs = self.model.simulate(&slices(&inputs), start.as_ref())?;
+            self.model.check_finite(&outputs, 0.0)?;
+            Ok::<_, innovant::model::ModelError>(outputs)
+        });
+        Ok(samples(py, &outputs.map_err(raise)?))
+    }
+
+    /// One-step predictions, from the initial state that fits best unless one is given.
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        u: Samples<'py>,
+        y: Samples<'py>,
+        x0: Option<PyReadonlyArray1<'py, f64>>,
+    ) -> PyResult<Matrix<'py>> {
+        let (inputs, outputs, start) = (columns(&u), columns(&y), state(x0.as_ref()));
+        let predicted = py.detach(|| {
+            let (inputs, outputs) = (slices(&inputs), slices(&outputs));
+            let start = match start {
+                Some(start) => start,
+                None => self.model.initial_state_of(&inputs, &outputs)?,
+            };
+            self.model.predict(&inputs, &outputs, Some(&start))
+        });
+        Ok(samples(py, &predicted.map_err(raise)?.predicted))
+    }
+
+    /// The state at the first sample that fits a recording best.
+    fn initial_state<'py>(
+        &self,
+        py: Python<'py>,
+        u: Samples<'py>,
+        y: Samples<'py>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (inputs, outputs) = (columns(&u), columns(&y));
+        let state = py.detach(|| {
+            self.model
+                .initial_state_of(&slices(&inputs), &slices(&outputs))
+        });
+        Ok(state.map_err(raise)?.as_slice().to_pyarray(py))
+    }
+
+    /// Fit and residual tests on recordings, as JSON and as text.
+    fn validate(
+        &self,
+        py: Python<'_>,
+        u: Vec<Samples<'_>>,
+        y: Vec<Samples<'_>>,
+        level: f64,
+        detrend: Option<&str>,
+        fresh: bool,
+    ) -> PyResult<(String, String)> {
+        if !(level > 0.0 && level < 0.5) {
+            return Err(raise(format!(
+                "level = {level}: expected a probability between 0 and 0.5, such as 0.01"
+            )));
+        }
+        let (inputs, outputs) = self.names();
+        let logs = recordings(&u, &y, self.dt(), &inputs, &outputs)?;
+        let (relation, zero) = match (detrend, fresh) {
+            (None, true) => (Relation::Fresh, Zero::Levels),
+            (None, false) => (Relation::Estimation, Zero::of_estimation(&self.model)),
+            (Some(word), _) => {
+                let relation = if fresh {
+                    Relation::Fresh
+                } else {
+                    Relation::Estimation
+                };
+                (relation, zero(word)?)
+            }
+        };
+        let tests = py.detach(|| {
+            let records: Vec<Deviations> = logs
+                .iter()
+                .map(|log| Deviations::of_log(log, &self.model, zero))
+                .collect();
+            judge(&self.model, &records, relation, Some(level))
+        });
+        let tests = tests.map_err(raise)?;
+        Ok((to_json(&tests).map_err(raise)?, validation_text(&tests)))
+    }
+
+    /// The document that the command line writes.
+    fn to_json(&self) -> PyResult<String> {
+        ModelDocument::new(&self.model)
+            .and_then(|document| document.with_residual_tests(self.tests.clone()).to_json())
+            .map_err(raise)
+    }
+
+    #[staticmethod]
+    fn from_json(name: &str, text: &str) -> PyResult<Self> {
+        let read = parse_model(name, text).map_err(raise)?;
+        Ok(Self {
+            tests: read.document.residual_tests().cloned(),
+            model: read.model,
+        })
+    }
+}
+
+fn zero(word: &str) -> PyResult<Zero> {
+    match word {
+        "level" => Ok(Zero::Levels),
+        "mean" => Ok(Zero::Own(Detrend::Mean)),
+        "linear" => Ok(Zero::Own(Detrend::Linear)),
+        _ => Err(raise(format!(
+            "detrend = {word:?}: expected one of level, mean, linear"
+        ))),
+    }
+}
+
+fn state(x0: Option<&PyReadonlyArray1<'_, f64>>) -> Option<DVector<f64>> {
+    x0.map(|x0| DVector::from_iterator(x0.as_array().len(), x0.as_array().iter().copied()))
+}
+
+/// Identifies a model from recordings, one pair of arrays an experiment.
+#[pyfunction]
+pub fn identify(
+    py: Python<'_>,
+    u: Vec<Samples<'_>>,
+    y: Vec<Samples<'_>>,
+    dt: f64,
+    inputs: Vec<String>,
+    outputs: Vec<String>,
+    json: &str,
+) -> PyResult<Model> {
+    let options = options(json)?;
+    let logs: Vec<Log> = recordings(&u, &y, dt, &inputs, &outputs)?;
+    let tested = py.detach(|| {
+        let mut records = MemoryRecords::new(&logs)?;
+        identify_and_test(&mut records, &options)
+    });
+    tested.map(Model::from).map_err(raise)
+}
