@@ -36,8 +36,10 @@ pub(super) fn run(log: &Path, model: &Path, batch: &Batch) -> Row {
                 tested.tests.as_ref(),
             ),
             Err(message) => {
-                // What an older log of this name left is not the model of this one.
-                let _ = fs::remove_file(model);
+                // What an earlier content of this log left is not the model of this one.
+                if log.is_file() {
+                    let _ = fs::remove_file(model);
+                }
                 Row::failed(log, message)
             }
         },

@@ -148,7 +148,7 @@ fn tell(model: &Model, tests: Option<&Validation>) {
 }
 
 /// Errors of the log module name their file; the others are about the recordings as a whole.
-pub(super) fn with_names(error: IdentifyError, logs: &[String]) -> anyhow::Error {
+fn with_names(error: IdentifyError, logs: &[String]) -> anyhow::Error {
     match error {
         IdentifyError::Log(error) => error.into(),
         error @ IdentifyError::SameRecording { .. } => error.into(),

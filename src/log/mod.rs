@@ -61,5 +61,5 @@ pub use reader::{
 pub use record::Log;
 pub use roles::{RoleNeed, Roles};
 pub use source::Source;
-pub use table::TableRoles;
+pub use table::{TableRoles, time_base_of};
 pub use writer::{CsvWriter, write_table};

@@ -4,13 +4,17 @@ use super::channel::Channel;
 use super::error::LogError;
 use super::header::Header;
 use super::reader::time_base;
-use super::roles::{Assigned, RoleNeed, Roles, assign};
+use super::roles::{RoleNeed, Roles, assign};
 
-/// Columns of a table by role, found by the same rules as those of a file.
-#[derive(Debug)]
+/// Columns of a table by role, found by the same rules as those of a file. Indices count from 0.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TableRoles {
-    header: Header,
-    assigned: Assigned,
+    /// Input columns.
+    pub inputs: Vec<usize>,
+    /// Output columns.
+    pub outputs: Vec<usize>,
+    /// The time column, if there is one.
+    pub time: Option<usize>,
 }
 
 impl TableRoles {
@@ -24,48 +28,35 @@ impl TableRoles {
         roles: &Roles,
         need: RoleNeed,
     ) -> Result<Self, LogError> {
-        let header = Header {
-            name: name.to_owned(),
-            channels: headers.iter().map(|h| Channel::parse(h)).collect(),
-            raw: headers.to_vec(),
-            separator: b',',
-            headerless: false,
-            line: 0,
-        };
-        let assigned = assign(roles, need, &header)?;
-        Ok(Self { header, assigned })
+        let found = assign(roles, need, &header(name, headers))?;
+        Ok(Self {
+            inputs: found.inputs,
+            outputs: found.outputs,
+            time: found.time,
+        })
     }
+}
 
-    /// Indices of the input columns, from 0.
-    pub fn inputs(&self) -> &[usize] {
-        &self.assigned.inputs
-    }
+/// Sample time and time of the first sample in seconds, from the time stamps of a column called `column`, which may
+/// carry their unit: `t [ms]`. Rows are numbered from 1 in messages.
+///
+/// # Errors
+/// [`LogError`] when the unit is not known or the stamps are not uniform.
+pub fn time_base_of(name: &str, column: &str, stamps: &[f64]) -> Result<(f64, f64), LogError> {
+    let header = header(name, &[column.to_owned()]);
+    let mut sampling = time_base(&header, 0, 1)?;
+    sampling.push(&header, stamps)?;
+    sampling.finish(&header)
+}
 
-    /// Indices of the output columns, from 0.
-    pub fn outputs(&self) -> &[usize] {
-        &self.assigned.outputs
-    }
-
-    /// Index of the time column, from 0, if there is one.
-    pub fn time(&self) -> Option<usize> {
-        self.assigned.time
-    }
-
-    /// Sample time and time of the first sample in seconds, from the time stamps in the unit of their column. Rows
-    /// are numbered from 1 in messages.
-    ///
-    /// # Errors
-    /// [`LogError`] when there is no time column, its unit is not known, or the stamps are not uniform.
-    pub fn time_base(&self, stamps: &[f64]) -> Result<(f64, f64), LogError> {
-        let Some(index) = self.assigned.time else {
-            return Err(LogError::NoTime {
-                name: self.header.name.clone(),
-                headers: self.header.list(),
-            });
-        };
-        let mut sampling = time_base(&self.header, index, 1)?;
-        sampling.push(&self.header, stamps)?;
-        sampling.finish(&self.header)
+fn header(name: &str, headers: &[String]) -> Header {
+    Header {
+        name: name.to_owned(),
+        channels: headers.iter().map(|h| Channel::parse(h)).collect(),
+        raw: headers.to_vec(),
+        separator: b',',
+        headerless: false,
+        line: 0,
     }
 }
 
@@ -78,10 +69,11 @@ mod tests {
         let headers = ["time [ms]", "u", "y [m]", "temperature"].map(str::to_owned);
         let found =
             TableRoles::find("frame", &headers, &Roles::default(), RoleNeed::Identify).unwrap();
-        assert_eq!((found.inputs(), found.outputs()), (&[1][..], &[2][..]));
-        assert_eq!(found.time(), Some(0));
-        assert_eq!(found.time_base(&[5.0, 7.0, 9.0]).unwrap(), (0.002, 0.005));
-        let error = found.time_base(&[5.0, 7.0, 9.0, 15.0]).unwrap_err();
+        assert_eq!((found.inputs, found.outputs), (vec![1], vec![2]));
+        assert_eq!(found.time, Some(0));
+        let base = |stamps: &[f64]| time_base_of("frame", &headers[0], stamps);
+        assert_eq!(base(&[5.0, 7.0, 9.0]).unwrap(), (0.002, 0.005));
+        let error = base(&[5.0, 7.0, 9.0, 15.0]).unwrap_err();
         assert!(error.to_string().contains("frame, line 4"), "{error}");
         let asked = Roles {
             outputs: Some(vec!["temprature".to_owned()]),

@@ -108,18 +108,16 @@ def _of_frame(
     inputs: list[str] | None,
     outputs: list[str] | None,
     time: str | None,
-    need: str = "both",
 ) -> tuple[Array, Array, float, list[str], list[str]]:
     names = headers(frame)
     dates = _dates(frame) if dt is None and time is None else None
     if dates is not None:
-        dt = _innovant.time_base(["time"], "time", list(_seconds(dates)))
-    u, y, when = _innovant.find_columns(names, inputs, outputs, time, dt, need)
+        dt = _innovant.time_base("time", list(_seconds(dates)))
+    u, y, when = _innovant.find_columns(names, inputs, outputs, time, dt, "both")
     if dt is None:
-        stamps = _seconds(_column(frame, when))
-        # Of dates the seconds are known; another unit may stand in the header.
-        header = "time" if np.asarray(_column(frame, when)).dtype.kind == "M" else names[when]
-        dt = _innovant.time_base([header], header, list(stamps))
+        stamps = np.asarray(_column(frame, when))
+        # Of dates the unit is known; of numbers it may stand in the header.
+        dt = _innovant.time_base("time" if stamps.dtype.kind == "M" else names[when], list(_seconds(stamps)))
     return _columns(frame, u), _columns(frame, y), dt, [names[i] for i in u], [names[i] for i in y]
 
 
