@@ -34,7 +34,7 @@ def variants(u, y):
         "lists of lists": (u.tolist(), y.tolist()),
         "other byte order": (u.astype(">f8"), y),
         "pandas": (frame, None),
-        "pandas arrays": (frame[["u1", "u2"]].to_numpy(), frame[["y1", "y2"]]),
+        "two frames": (frame[["u1", "u2"]], frame[["y1", "y2"]]),
         "polars": (polars.from_numpy(frame.to_numpy(), schema=list(frame.columns)), None),
     }
 
@@ -43,11 +43,10 @@ def test_layout_and_container_do_not_matter(closed_loop):
     u, y = closed_loop.u, closed_loop.y
     expected = innovant.identify(u, y, dt=1.0, order=4)
     for name, (first, second) in variants(u, y).items():
-        if second is not None and hasattr(second, "columns"):
-            second = second.to_numpy()
         found = innovant.identify(first, second, dt=1.0, order=4)
         assert np.array_equal(found.A, expected.A), name
         assert np.array_equal(found.covariance, expected.covariance), name
+        assert found.output_labels == ["y1", "y2"], name
 
 
 def test_inputs_are_not_modified(closed_loop):

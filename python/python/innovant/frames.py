@@ -148,6 +148,9 @@ def recordings(
     us, ys = experiments(u), experiments(y)
     if len(us) != len(ys):
         raise InnovantError(f"{len(us)} experiments in u and {len(ys)} in y: give one of each for every experiment")
+    # A frame of inputs alone, or of outputs alone, names its channels.
+    inputs = headers(us[0]) if inputs is None and is_frame(us[0]) else inputs
+    outputs = headers(ys[0]) if outputs is None and is_frame(ys[0]) else outputs
     us = [samples(part, "u") for part in us]
     ys = [samples(part, "y") for part in ys]
     for which, parts in (("u", us), ("y", ys)):
