@@ -38,6 +38,13 @@ fn _innovant(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<moments::Moments>()?;
     module.add_function(wrap_pyfunction!(model::identify, module)?)?;
     module.add_function(wrap_pyfunction!(explanation::explain, module)?)?;
+    module.add_function(wrap_pyfunction!(responses::poles, module)?)?;
+    module.add_function(wrap_pyfunction!(responses::zeros, module)?)?;
+    module.add_function(wrap_pyfunction!(responses::default_frequencies, module)?)?;
+    module.add_function(wrap_pyfunction!(responses::frequency_response, module)?)?;
+    module.add_function(wrap_pyfunction!(responses::settling_samples, module)?)?;
+    module.add_function(wrap_pyfunction!(responses::step_response, module)?)?;
+    module.add_function(wrap_pyfunction!(responses::static_gain, module)?)?;
     module.add_function(wrap_pyfunction!(examples::example, module)?)?;
     module.add_function(wrap_pyfunction!(table::find_columns, module)?)?;
     module.add_function(wrap_pyfunction!(table::time_base, module)?)?;

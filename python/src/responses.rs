@@ -53,133 +53,138 @@ fn roots(py: Python<'_>, roots: Vec<PoleUncertainty>) -> Roots<'_> {
     (value, covariance.into_pyarray(py), columns)
 }
 
-#[pymethods]
-impl Model {
-    fn poles<'py>(&self, py: Python<'py>) -> PyResult<Roots<'py>> {
-        let system = &self.model.system;
-        let found = match &self.model.covariance {
-            Some(covariance) => pole_uncertainties(system, covariance).map_err(raise)?,
-            None => self.without_uncertainty(system.poles().map_err(raise)?),
-        };
-        Ok(roots(py, found))
-    }
-
-    fn zeros<'py>(&self, py: Python<'py>) -> PyResult<Roots<'py>> {
-        let system = &self.model.system;
-        let found = match &self.model.covariance {
-            Some(covariance) => zero_uncertainties(system, covariance).map_err(raise)?,
-            None => self.without_uncertainty(system.zeros().map_err(raise)?),
-        };
-        Ok(roots(py, found))
-    }
-
-    /// Logarithmic grid up to the Nyquist frequency.
-    fn default_frequencies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let grid = self.model.system.default_frequencies(FREQUENCIES);
-        Ok(Array1::from_vec(grid.map_err(raise)?).into_pyarray(py))
-    }
-
-    /// From the inputs, or from the innovations, at frequencies in rad/s; arrays outputs x inputs x frequencies.
-    fn frequency_response<'py>(
-        &self,
-        py: Python<'py>,
-        omega: PyReadonlyArray1<'py, f64>,
-        noise: bool,
-    ) -> PyResult<Response<'py>> {
-        let system = &self.model.system;
-        let omega: Vec<f64> = omega.as_array().iter().copied().collect();
-        let path = if noise { Path::Innovation } else { Path::Input };
-        let columns = if noise {
-            system.outputs()
-        } else {
-            system.inputs()
-        };
-        let shape = (system.outputs(), columns, omega.len());
-        let seed = self.model.summary.as_ref().map_or(0, |s| s.options.seed);
-        let bands = py.detach(|| match &self.model.covariance {
-            Some(covariance) => response_bands(system, covariance, &omega, path, seed).map(Some),
-            None => Ok(None),
-        });
-        let Some(bands) = bands.map_err(raise)? else {
-            let at: Vec<DMatrix<Complex64>> =
-                omega.iter().map(|w| path.response(system, *w)).collect();
-            let response = Array3::from_shape_fn(shape, |(o, i, k)| at[k][(o, i)]);
-            return Ok((response.into_pyarray(py), None, None));
-        };
-        let band = |(o, i, k): (usize, usize, usize)| &bands[k][(o, i)];
-        let (l, r, m) = shape;
-        let response = Array3::from_shape_fn(shape, |at| band(at).response);
-        let covariance = Array5::from_shape_fn((l, r, m, 2, 2), |(o, i, k, a, b)| {
-            band((o, i, k)).covariance[a][b]
-        });
-        let ends = |of: &dyn Fn(&innovant::covariance::ResponseBand) -> [f64; 2]| {
-            Array4::from_shape_fn((l, r, m, 2), |(o, i, k, end)| of(band((o, i, k)))[end])
-                .into_pyarray(py)
-        };
-        Ok((
-            response.into_pyarray(py),
-            Some(covariance.into_pyarray(py)),
-            Some(vec![
-                ends(&|b| b.magnitude_95),
-                ends(&|b| b.magnitude_99),
-                ends(&|b| b.phase_95),
-            ]),
-        ))
-    }
-
-    /// Samples after which a step has settled.
-    fn settling_samples(&self, most: usize) -> PyResult<usize> {
-        self.model.system.settling_samples(most).map_err(raise)
-    }
-
-    /// Values and standard deviations, outputs x inputs x samples.
-    #[allow(clippy::type_complexity, reason = "a pair of arrays")]
-    fn step_response<'py>(
-        &self,
-        py: Python<'py>,
-        count: usize,
-    ) -> PyResult<(Bound<'py, PyArray3<f64>>, Option<Bound<'py, PyArray3<f64>>>)> {
-        let system = &self.model.system;
-        let shape = (system.outputs(), system.inputs(), count);
-        let stacked = |of: &[DMatrix<f64>]| {
-            Array3::from_shape_fn(shape, |(o, i, k)| of[k][(o, i)]).into_pyarray(py)
-        };
-        let (values, std) = py.detach(|| {
-            let values = system.step_response(count);
-            let covariance = self.model.covariance.as_ref();
-            (
-                values,
-                covariance.map(|c| step_response_std(system, c, count)),
-            )
-        });
-        let std = std.transpose().map_err(raise)?;
-        Ok((stacked(&values), std.map(|std| stacked(&std))))
-    }
-
-    /// Static gain and its standard deviation, outputs x inputs; `None` with an integrator.
-    #[allow(clippy::type_complexity, reason = "a pair of arrays")]
-    fn static_gain<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<Option<(Bound<'py, PyArray2<f64>>, Option<Bound<'py, PyArray2<f64>>>)>> {
-        let system = &self.model.system;
-        let Some(gain) = system.static_gain() else {
-            return Ok(None);
-        };
-        let std = match &self.model.covariance {
-            Some(covariance) => static_gain_std(system, covariance).map_err(raise)?,
-            None => None,
-        };
-        Ok(Some((matrix(py, &gain), std.map(|std| matrix(py, &std)))))
-    }
+/// Poles, slowest first.
+#[pyfunction]
+pub fn poles<'py>(py: Python<'py>, model: &Model) -> PyResult<Roots<'py>> {
+    let system = &model.model.system;
+    let found = match &model.model.covariance {
+        Some(covariance) => pole_uncertainties(system, covariance).map_err(raise)?,
+        None => without_uncertainty(system.sample_time, system.poles().map_err(raise)?),
+    };
+    Ok(roots(py, found))
 }
 
-impl Model {
-    fn without_uncertainty(&self, roots: Vec<Pole>) -> Vec<PoleUncertainty> {
-        let dt = self.model.system.sample_time;
-        roots
-            .into_iter()
-            .map(|root| PoleUncertainty::new(root, None, dt))
-            .collect()
-    }
+/// Invariant zeros from inputs to outputs.
+#[pyfunction]
+pub fn zeros<'py>(py: Python<'py>, model: &Model) -> PyResult<Roots<'py>> {
+    let system = &model.model.system;
+    let found = match &model.model.covariance {
+        Some(covariance) => zero_uncertainties(system, covariance).map_err(raise)?,
+        None => without_uncertainty(system.sample_time, system.zeros().map_err(raise)?),
+    };
+    Ok(roots(py, found))
+}
+
+/// Logarithmic grid up to the Nyquist frequency.
+#[pyfunction]
+pub fn default_frequencies<'py>(
+    py: Python<'py>,
+    model: &Model,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let grid = model.model.system.default_frequencies(FREQUENCIES);
+    Ok(Array1::from_vec(grid.map_err(raise)?).into_pyarray(py))
+}
+
+/// From the inputs, or from the innovations, at frequencies in rad/s; arrays outputs x inputs x frequencies.
+#[pyfunction]
+pub fn frequency_response<'py>(
+    model: &Model,
+    py: Python<'py>,
+    omega: PyReadonlyArray1<'py, f64>,
+    noise: bool,
+) -> PyResult<Response<'py>> {
+    let system = &model.model.system;
+    let omega: Vec<f64> = omega.as_array().iter().copied().collect();
+    let path = if noise { Path::Innovation } else { Path::Input };
+    let columns = if noise {
+        system.outputs()
+    } else {
+        system.inputs()
+    };
+    let shape = (system.outputs(), columns, omega.len());
+    let seed = model.model.summary.as_ref().map_or(0, |s| s.options.seed);
+    let bands = py.detach(|| match &model.model.covariance {
+        Some(covariance) => response_bands(system, covariance, &omega, path, seed).map(Some),
+        None => Ok(None),
+    });
+    let Some(bands) = bands.map_err(raise)? else {
+        let at: Vec<DMatrix<Complex64>> = omega.iter().map(|w| path.response(system, *w)).collect();
+        let response = Array3::from_shape_fn(shape, |(o, i, k)| at[k][(o, i)]);
+        return Ok((response.into_pyarray(py), None, None));
+    };
+    let band = |(o, i, k): (usize, usize, usize)| &bands[k][(o, i)];
+    let (l, r, m) = shape;
+    let response = Array3::from_shape_fn(shape, |at| band(at).response);
+    let covariance = Array5::from_shape_fn((l, r, m, 2, 2), |(o, i, k, a, b)| {
+        band((o, i, k)).covariance[a][b]
+    });
+    let ends = |of: &dyn Fn(&innovant::covariance::ResponseBand) -> [f64; 2]| {
+        Array4::from_shape_fn((l, r, m, 2), |(o, i, k, end)| of(band((o, i, k)))[end])
+            .into_pyarray(py)
+    };
+    Ok((
+        response.into_pyarray(py),
+        Some(covariance.into_pyarray(py)),
+        Some(vec![
+            ends(&|b| b.magnitude_95),
+            ends(&|b| b.magnitude_99),
+            ends(&|b| b.phase_95),
+        ]),
+    ))
+}
+
+/// Samples after which a step has settled.
+#[pyfunction]
+pub fn settling_samples(model: &Model, most: usize) -> PyResult<usize> {
+    model.model.system.settling_samples(most).map_err(raise)
+}
+
+/// Values and standard deviations, outputs x inputs x samples.
+#[pyfunction]
+#[allow(clippy::type_complexity, reason = "a pair of arrays")]
+pub fn step_response<'py>(
+    model: &Model,
+    py: Python<'py>,
+    count: usize,
+) -> PyResult<(Bound<'py, PyArray3<f64>>, Option<Bound<'py, PyArray3<f64>>>)> {
+    let system = &model.model.system;
+    let shape = (system.outputs(), system.inputs(), count);
+    let stacked = |of: &[DMatrix<f64>]| {
+        Array3::from_shape_fn(shape, |(o, i, k)| of[k][(o, i)]).into_pyarray(py)
+    };
+    let (values, std) = py.detach(|| {
+        let values = system.step_response(count);
+        let covariance = model.model.covariance.as_ref();
+        (
+            values,
+            covariance.map(|c| step_response_std(system, c, count)),
+        )
+    });
+    let std = std.transpose().map_err(raise)?;
+    Ok((stacked(&values), std.map(|std| stacked(&std))))
+}
+
+/// Static gain and its standard deviation, outputs x inputs; `None` with an integrator.
+#[pyfunction]
+#[allow(clippy::type_complexity, reason = "a pair of arrays")]
+pub fn static_gain<'py>(
+    model: &Model,
+    py: Python<'py>,
+) -> PyResult<Option<(Bound<'py, PyArray2<f64>>, Option<Bound<'py, PyArray2<f64>>>)>> {
+    let system = &model.model.system;
+    let Some(gain) = system.static_gain() else {
+        return Ok(None);
+    };
+    let std = match &model.model.covariance {
+        Some(covariance) => static_gain_std(system, covariance).map_err(raise)?,
+        None => None,
+    };
+    Ok(Some((matrix(py, &gain), std.map(|std| matrix(py, &std)))))
+}
+
+fn without_uncertainty(dt: f64, roots: Vec<Pole>) -> Vec<PoleUncertainty> {
+    roots
+        .into_iter()
+        .map(|root| PoleUncertainty::new(root, None, dt))
+        .collect()
 }

@@ -162,7 +162,7 @@ def test_the_gil_is_released():
     import threading
     import time
 
-    u, y, dt = innovant.examples.closed_loop(300_000)
+    u, y, dt = innovant.examples.closed_loop(1_000_000)
     done, longest = threading.Event(), 0.0
 
     def work():
@@ -179,4 +179,4 @@ def test_the_gil_is_released():
         longest, before, ticks = max(longest, now - before), now, ticks + 1
     thread.join()
     # Copying the arrays holds it; the rest, most of the time, does not.
-    assert ticks > 5 and longest < 0.6 * (time.perf_counter() - started)
+    assert ticks > 5 and longest < 0.8 * (time.perf_counter() - started)

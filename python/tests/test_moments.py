@@ -31,7 +31,7 @@ def test_chunks_join_to_the_whole(closed_loop):
 def test_pickles_are_exact(closed_loop):
     moments = innovant.Moments(closed_loop.u, closed_loop.y, dt=1.0, order=4, past=12)
     restored = pickle.loads(pickle.dumps(moments))
-    assert pickle.dumps(restored) == pickle.dumps(moments)
+    assert restored.__reduce__() == moments.__reduce__()
     assert restored.identify().to_json() == moments.identify().to_json()
     assert "lags=12" in repr(restored)
 

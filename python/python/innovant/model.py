@@ -183,11 +183,11 @@ class Model:
         >>> bool(numpy.all(numpy.abs(poles) < 1)), poles.covariance.shape
         (True, (3, 2, 2))
         """
-        return _roots(self._core.poles())
+        return _roots(_innovant.poles(self._core))
 
     def zeros(self) -> Roots:
         """Invariant zeros from inputs to outputs, as `poles`."""
-        return _roots(self._core.zeros())
+        return _roots(_innovant.zeros(self._core))
 
     def frequency_response(self, omega: ArrayLike | None = None) -> FrequencyResponse:
         """Response from inputs to outputs at `omega` (rad/s; default: a logarithmic grid up to Nyquist), with bands.
@@ -206,7 +206,7 @@ class Model:
 
     def _response(self, omega: ArrayLike | None, *, noise: bool) -> FrequencyResponse:
         if omega is None:
-            grid = self._core.default_frequencies()
+            grid = _innovant.default_frequencies(self._core)
         else:
             grid = np.atleast_1d(np.asarray(omega, dtype=np.float64))
         nyquist = np.pi / self.dt
@@ -217,7 +217,7 @@ class Model:
                 f"omega = {beyond[0]}: beyond the Nyquist frequency of this model, {nyquist:.6} rad/s, or below zero, "
                 "there is nothing to see"
             )
-        response, covariance, bands = self._core.frequency_response(grid, noise)
+        response, covariance, bands = _innovant.frequency_response(self._core, grid, noise)
         magnitude_95, magnitude_99, phase_95 = bands or (None, None, None)
         return FrequencyResponse(grid, response, covariance, magnitude_95, magnitude_99, phase_95)
 
@@ -226,13 +226,13 @@ class Model:
 
         Without `samples` it lasts until it has settled.
         """
-        count = samples if samples is not None else self._core.settling_samples(LONGEST_STEP_RESPONSE)
-        values, std = self._core.step_response(count)
+        count = samples if samples is not None else _innovant.settling_samples(self._core, LONGEST_STEP_RESPONSE)
+        values, std = _innovant.step_response(self._core, count)
         return StepResponse(np.arange(count) * self.dt, values, std)
 
     def static_gain(self) -> tuple[Array, Array | None] | None:
         """Static gain and its standard deviation, outputs x inputs; `None` with an integrator."""
-        return self._core.static_gain()
+        return _innovant.static_gain(self._core)
 
     # -- on data
 
