@@ -95,7 +95,7 @@ def test_frames_name_their_columns(closed_loop):
     assert list(simulated.columns) == ["position [m]"] and len(simulated) == 2000
     assert isinstance(model.predict(polars.from_pandas(frame)), polars.DataFrame)
     with pytest.raises(innovant.InnovantError, match="did you mean `torque`?"):
-        innovant.identify(frame, inputs=["tork"], outputs="position")
+        innovant.identify(frame, inputs=["torqe"], outputs="position")
 
 
 def test_options_reach_the_core(closed_loop):
@@ -108,7 +108,7 @@ def test_options_reach_the_core(closed_loop):
     assert document["weight"] == "cva" and document["polished"] is False
     assert document["options"]["detrend"] == "none"
     assert innovant.identify(u, y, dt=1.0, order=range(3, 6)).order == 4
-    robust = innovant.identify(u, y, dt=1.0, order=4, covariance="robust")
+    robust = innovant.identify(u, y, dt=1.0, order=4, past=10, covariance="robust")
     assert json.loads(robust.to_json())["diagnostics"]["jackknife_blocks"] >= 20
     whitening = innovant.identify(u, y, dt=1.0, order=4, method="whitening")
     assert json.loads(whitening.to_json())["method"] == "whitening"
