@@ -58,8 +58,8 @@ def error(a, b, c, d):
     return np.max(np.linalg.norm(response(a, b, c, d) - true, axis=(1, 2)) / scale)
 
 
-def fastest(call, runs=5):
-    """The best of a few runs, and what the last one gave."""
+def fastest(call, runs=15):
+    """The best of a few runs (of slow calls fewer), and what the last one gave."""
     best = np.inf
     for _ in range(runs):
         started = time.perf_counter()

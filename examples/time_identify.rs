@@ -1,4 +1,4 @@
-//! Seconds of an identification of Example I in closed loop, best of five: alone, and with the residual tests.
+//! Seconds of an identification of Example I in closed loop, best of fifteen: alone, and with the residual tests.
 //! `cargo run --release --example time_identify -- 1000000 20`
 
 use std::time::Instant;
@@ -7,7 +7,7 @@ use innovant::identify::MemoryRecords;
 use innovant::validate::identify_and_test;
 use innovant::{Options, identify, systems};
 
-const RUNS: usize = 5;
+const RUNS: usize = 15;
 
 fn best(
     mut run: impl FnMut() -> Result<(), innovant::IdentifyError>,

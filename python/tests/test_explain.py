@@ -33,8 +33,8 @@ def test_every_kind_of_simulation_says_the_same(explanation, friction):
     simulated = friction.simulate(friction.u)
     from_array = innovant.explain(friction.u, friction.y, simulation=simulated, dt=friction.dt)
     assert from_array.to_json() == explanation.to_json()
-    a, b = [[0.0, 1.0], [-25.0, -1.0]], [[0.0], [1.0]]
-    sampled = scipy.signal.cont2discrete((a, b, [[1.0, 0.0]], [[0.0]]), friction.dt)
+    a, b = np.array([[0.0, 1.0], [-25.0, -1.0]]), np.array([[0.0], [1.0]])
+    sampled = scipy.signal.cont2discrete((a, b, np.array([[1.0, 0.0]]), np.zeros((1, 1))), friction.dt)
     model = innovant.Model(*sampled[:4], dt=friction.dt)
     for simulation in (model, model.to_control(), model.to_scipy()):
         found = innovant.explain(friction.u, friction.y, simulation=simulation, dt=friction.dt)

@@ -73,7 +73,7 @@ def identify(
     >>> model
     innovant.Model(order=4, inputs=['u1', 'u2'], outputs=['y1', 'y2'], dt=1.0)
     >>> model.poles().natural_frequency.round(2)
-    array([0.79, 0.79, 2.36, 2.36])
+    array([0.78, 0.78, 2.36, 2.36])
 
     A frame, with names and units:
 
