@@ -2,8 +2,10 @@
 
 import json
 import pickle
+from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
 import scipy.signal
 
@@ -68,3 +70,23 @@ def test_errors_have_the_words_of_the_command_line(friction):
             innovant.explain(u, y, simulation=simulation, dt=dt)
     with pytest.raises(innovant.InnovantError, match="no effect called"):
         innovant.explain(u, y, simulation=y, dt=dt, without=["gremlins"])
+
+
+def test_a_simulator_that_is_not_linear_corrects_its_own_answer():
+    """Known by its outputs alone, it is asked again for new inputs; frames give frames."""
+    case = Path(__file__).parents[2] / "data" / "concealed" / "case_010"
+    recording, simulated = pandas.read_csv(case / "recording.csv"), pandas.read_csv(case / "simulation.csv")
+    new, answer = pandas.read_csv(case / "fresh_input.csv"), pandas.read_csv(case / "fresh_simulation.csv")
+    simulator = {len(recording): simulated, len(new): answer}
+    found = innovant.explain(recording, simulation=lambda frame: simulator[len(frame)])
+    truth = pandas.read_csv(case.parent / "truth" / "case_010_fresh.csv")
+    outputs = ["y1"]
+    simulation = found.simulate(new)
+    assert list(simulation.columns) == outputs
+    error = simulation.to_numpy() - truth[outputs].to_numpy()
+    before = answer[outputs].to_numpy() - truth[outputs].to_numpy()
+    assert np.sqrt(np.mean(error**2)) < 0.3 * np.sqrt(np.mean(before**2))
+    restored = pickle.loads(pickle.dumps(found))
+    with pytest.raises(innovant.InnovantError, match="relative to a simulator that is not linear"):
+        restored.simulate(new)
+    assert np.array_equal(restored.simulate(new, simulation=answer), simulation)
