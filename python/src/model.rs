@@ -1,13 +1,15 @@
 //! The model: matrices, what it foresees, whether it holds, and its document.
 
-use innovant::identify::MemoryRecords;
+use std::mem;
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+use innovant::Options;
+use innovant::identify::{IdentifyError, MemoryRecords, Records, identify_records};
 use innovant::log::Log;
 use innovant::moments::Detrend;
 use innovant::report::text::{ModelText, Style, model_text, validation_text, verdict};
 use innovant::report::{ModelDocument, parse_model, to_json};
-use innovant::validate::{
-    Deviations, Relation, TestedModel, Validation, Zero, identify_and_test, judge,
-};
+use innovant::validate::{Deviations, Relation, TestedModel, Zero, judge, test_residuals};
 use nalgebra::DVector;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, ToPyArray};
 use pyo3::prelude::*;
@@ -16,17 +18,35 @@ use crate::arrays::{Samples, columns, matrix, recordings, samples, slices};
 use crate::errors::raise;
 use crate::options::options;
 
-/// A model with the tests of its residuals.
+/// A model; the tests of its residuals are made when they are first asked for.
 #[pyclass(module = "innovant._innovant", frozen)]
 pub struct Model {
     pub model: innovant::Model,
-    pub tests: Option<Validation>,
+    /// What the tests look at, until they have been made.
+    pending: Mutex<Vec<Deviations>>,
+    tested: OnceLock<TestedModel>,
 }
 
-impl From<TestedModel> for Model {
-    fn from(tested: TestedModel) -> Self {
-        let TestedModel { model, tests } = tested;
-        Self { model, tests }
+impl Model {
+    /// Identifies a model and keeps what its tests will look at.
+    pub fn identified(records: &mut dyn Records, options: &Options) -> Result<Self, IdentifyError> {
+        let model = identify_records(records, options)?;
+        let deviations = Deviations::of_records(records, &model)?;
+        Ok(Self {
+            model,
+            pending: Mutex::new(deviations),
+            tested: OnceLock::new(),
+        })
+    }
+
+    /// The model with what its tests have to say.
+    fn tested(&self, py: Python<'_>) -> &TestedModel {
+        py.detach(|| {
+            self.tested.get_or_init(|| {
+                let mut pending = self.pending.lock().unwrap_or_else(PoisonError::into_inner);
+                test_residuals(self.model.clone(), &mem::take(&mut *pending))
+            })
+        })
     }
 }
 
@@ -93,28 +113,31 @@ impl Model {
         self.model.inputs.iter().map(|c| c.delay).collect()
     }
 
-    fn warnings(&self) -> Vec<String> {
-        let summary = self.model.summary.as_ref();
+    fn warnings(&self, py: Python<'_>) -> Vec<String> {
+        let summary = self.tested(py).model.summary.as_ref();
         summary.map_or_else(Vec::new, |s| s.warnings.clone())
     }
 
-    fn verdict(&self) -> String {
-        verdict(&self.model, self.tests.as_ref())
+    fn verdict(&self, py: Python<'_>) -> String {
+        let TestedModel { model, tests } = self.tested(py);
+        verdict(model, tests.as_ref())
     }
 
     /// The table that the command line prints.
-    fn text(&self) -> String {
+    fn text(&self, py: Python<'_>) -> String {
+        let TestedModel { model, tests } = self.tested(py);
         model_text(&ModelText {
-            model: &self.model,
-            tests: self.tests.as_ref(),
+            model,
+            tests: tests.as_ref(),
             orders: &[],
             style: Style::UNICODE,
         })
     }
 
     /// The tests of the residuals as JSON.
-    fn residual_tests(&self) -> PyResult<Option<String>> {
-        self.tests.as_ref().map(to_json).transpose().map_err(raise)
+    fn residual_tests(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        let tests = self.tested(py).tests.as_ref();
+        tests.map(to_json).transpose().map_err(raise)
     }
 
     /// Free run on inputs of samples x channels.
@@ -209,18 +232,24 @@ impl Model {
     }
 
     /// The document that the command line writes.
-    fn to_json(&self) -> PyResult<String> {
-        ModelDocument::new(&self.model)
-            .and_then(|document| document.with_residual_tests(self.tests.clone()).to_json())
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        let TestedModel { model, tests } = self.tested(py);
+        ModelDocument::new(model)
+            .and_then(|document| document.with_residual_tests(tests.clone()).to_json())
             .map_err(raise)
     }
 
     #[staticmethod]
     fn from_json(name: &str, text: &str) -> PyResult<Self> {
         let read = parse_model(name, text).map_err(raise)?;
+        let tests = read.document.residual_tests().cloned();
         Ok(Self {
-            tests: read.document.residual_tests().cloned(),
-            model: read.model,
+            model: read.model.clone(),
+            pending: Mutex::default(),
+            tested: OnceLock::from(TestedModel {
+                model: read.model,
+                tests,
+            }),
         })
     }
 }
@@ -253,9 +282,6 @@ pub fn identify(
 ) -> PyResult<Model> {
     let options = options(json)?;
     let logs: Vec<Log> = recordings(&u, &y, dt, &inputs, &outputs)?;
-    let tested = py.detach(|| {
-        let mut records = MemoryRecords::new(&logs)?;
-        identify_and_test(&mut records, &options)
-    });
-    tested.map(Model::from).map_err(raise)
+    let model = py.detach(|| Model::identified(&mut MemoryRecords::new(&logs)?, &options));
+    model.map_err(raise)
 }

@@ -1,7 +1,6 @@
 //! Recordings reduced to moments, which can be sent around, joined and added.
 
 use innovant::identify::{Records, ReducedRecords};
-use innovant::validate::identify_and_test;
 use pyo3::prelude::*;
 
 use crate::arrays::{Samples, columns, recording};
@@ -61,8 +60,8 @@ impl Moments {
 
     fn identify(&self, py: Python<'_>, json: &str) -> PyResult<Model> {
         let options = options(json)?;
-        let tested = py.detach(|| identify_and_test(&mut self.reduced.clone(), &options));
-        tested.map(Model::from).map_err(raise)
+        let model = py.detach(|| Model::identified(&mut self.reduced.clone(), &options));
+        model.map_err(raise)
     }
 
     fn to_json(&self) -> PyResult<String> {

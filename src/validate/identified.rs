@@ -25,16 +25,14 @@ pub fn identify_and_test(
 ) -> Result<TestedModel, IdentifyError> {
     let model = identify_records(records, options)?;
     check_recorded_once(&model)?;
-    Ok(tested(records, model)?)
+    let deviations = Deviations::of_records(records, &model)?;
+    Ok(test_residuals(model, &deviations))
 }
 
-/// Tests the residuals of a model that was just estimated from `records`.
-pub(crate) fn tested(
-    records: &mut dyn Records,
-    mut model: Model,
-) -> Result<TestedModel, crate::log::LogError> {
-    let deviations = Deviations::of_records(records, &model)?;
-    match judge(&model, &deviations, Relation::Estimation, None) {
+/// Tests the residuals of a model on the recordings that it was estimated from, as [`identify_and_test`] does at once:
+/// `deviations` are what [`Deviations::of_records`] gives after the identification.
+pub fn test_residuals(mut model: Model, deviations: &[Deviations]) -> TestedModel {
+    match judge(&model, deviations, Relation::Estimation, None) {
         Ok(tests) => {
             let feedback = tests.feedback.as_ref();
             if let Some(summary) = &mut model.summary
@@ -47,10 +45,10 @@ pub(crate) fn tested(
                         .to_owned(),
                 );
             }
-            Ok(TestedModel {
+            TestedModel {
                 model,
                 tests: Some(tests),
-            })
+            }
         }
         Err(reason) => {
             if let Some(summary) = &mut model.summary {
@@ -58,7 +56,7 @@ pub(crate) fn tested(
                     .warnings
                     .push(format!("the residuals were not tested: {reason}"));
             }
-            Ok(TestedModel { model, tests: None })
+            TestedModel { model, tests: None }
         }
     }
 }

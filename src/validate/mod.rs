@@ -63,7 +63,7 @@ mod tests;
 
 pub use deviations::{Deviations, Zero, judge};
 pub use error::ValidateError;
-pub use identified::{TestedModel, identify_and_test};
+pub use identified::{TestedModel, identify_and_test, test_residuals};
 pub use options::{RecordView, Relation, ValidationOptions};
 pub use result::{
     FitMeasure, InnovationSize, OutputFit, OutputSize, PairCorrelation, ResidualTest, Strongest,

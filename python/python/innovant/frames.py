@@ -14,6 +14,9 @@ from ._innovant import InnovantError
 
 Array = NDArray[np.float64]
 
+#: Sample times of one plant's recordings may differ by this, as on the command line.
+SAMPLING_TOLERANCE = 1e-3
+
 
 @dataclass
 class Recordings:
@@ -115,6 +118,8 @@ def _of_frame(
         dt = _innovant.time_base("time", list(_seconds(dates)))
     u, y, when = _innovant.find_columns(names, inputs, outputs, time, dt, "both")
     if dt is None:
+        # Without dt a time column was found, or there was an error that says so.
+        assert when is not None
         stamps = np.asarray(_column(frame, when))
         # Of dates the unit is known; of numbers it may stand in the header.
         dt = _innovant.time_base("time" if stamps.dtype.kind == "M" else names[when], list(_seconds(stamps)))
@@ -139,9 +144,9 @@ def recordings(
                 "y is missing: give u and y as arrays, or one data frame with inputs=[...] and outputs=[...]"
             )
         parts = [_of_frame(frame, dt, inputs, outputs, time) for frame in frames]
-        for part in parts[1:]:
-            if abs(part[2] - parts[0][2]) > 1e-3 * parts[0][2]:
-                raise InnovantError(f"sample times differ: {parts[0][2]} s and {part[2]} s; resample one of the frames")
+        for other in parts[1:]:
+            if abs(other[2] - parts[0][2]) > SAMPLING_TOLERANCE * parts[0][2]:
+                raise InnovantError(f"sample times differ: {parts[0][2]} s and {other[2]} s; resample one of the frames")
         return Recordings([p[0] for p in parts], [p[1] for p in parts], parts[0][2], parts[0][3], parts[0][4])
     if dt is None:
         raise InnovantError("the sample time is not known: pass dt= (seconds)")
@@ -153,8 +158,8 @@ def recordings(
     outputs = headers(ys[0]) if outputs is None and is_frame(ys[0]) else outputs
     us = [samples(part, "u") for part in us]
     ys = [samples(part, "y") for part in ys]
-    for which, parts in (("u", us), ("y", ys)):
-        counts = {part.shape[1] for part in parts}
+    for which, arrays in (("u", us), ("y", ys)):
+        counts = {array.shape[1] for array in arrays}
         if len(counts) > 1:
             raise InnovantError(f"the experiments in {which} differ in their channels: {sorted(counts)}")
     return Recordings(

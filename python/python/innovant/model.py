@@ -170,7 +170,7 @@ class Model:
 
     @property
     def residual_tests(self) -> Record | None:
-        """Tests of the residuals on the recordings that it was estimated from."""
+        """Tests of the residuals on the recordings that it was estimated from, made when first asked for."""
         tests = self._core.residual_tests()
         return None if tests is None else read(tests)
 
@@ -228,7 +228,7 @@ class Model:
         """
         count = samples if samples is not None else _innovant.settling_samples(self._core, LONGEST_STEP_RESPONSE)
         values, std = _innovant.step_response(self._core, count)
-        return StepResponse(np.arange(count) * self.dt, values, std)
+        return StepResponse(np.arange(count, dtype=np.float64) * np.float64(self.dt), values, std)
 
     def static_gain(self) -> tuple[Array, Array | None] | None:
         """Static gain and its standard deviation, outputs x inputs; `None` with an integrator."""

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from . import _innovant, frames
 from ._innovant import InnovantError
 from .model import Model
 from .options import written
-
-if TYPE_CHECKING:
-    from .options import Options
 
 #: Samples kept from the beginning of a recording: the initial state and the residual tests look at them.
 SAMPLES_KEPT = 20_000
@@ -66,7 +63,7 @@ class Moments:
         data = frames.recordings(u, y, dt=dt, inputs=inputs, outputs=outputs, time=time)
         if len(data.u) != 1:
             raise InnovantError("one recording at a time: make moments of each, and add them")
-        self._options: Options = options
+        self._options = options
         names = (data.inputs, data.outputs)
         self._core = _innovant.Moments(data.u[0], data.y[0], data.dt, names, overlap, keep, written(options))
 
