@@ -9,6 +9,7 @@
 //! | `errors` | every error of the core is an `InnovantError` with the words of the command line |
 //! | `options` | options of `identify`, from JSON |
 //! | `examples` | recordings of known plants |
+//! | `records` | recordings that stay in their arrays |
 //! | `model` | the model: matrices, simulate, predict, validate, documents |
 //! | `responses` | poles, zeros, frequency and step response with their uncertainty |
 //! | `explanation` | `explain` and its answer |
@@ -22,6 +23,7 @@ mod explanation;
 mod model;
 mod moments;
 mod options;
+mod records;
 mod responses;
 mod table;
 

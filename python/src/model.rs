@@ -4,8 +4,7 @@ use std::mem;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use innovant::Options;
-use innovant::identify::{IdentifyError, MemoryRecords, Records, identify_records};
-use innovant::log::Log;
+use innovant::identify::{IdentifyError, Records, identify_records};
 use innovant::moments::Detrend;
 use innovant::report::text::{ModelText, Style, model_text, validation_text, verdict};
 use innovant::report::{ModelDocument, parse_model, to_json};
@@ -17,6 +16,7 @@ use pyo3::prelude::*;
 use crate::arrays::{Samples, columns, matrix, recordings, samples, slices};
 use crate::errors::raise;
 use crate::options::options;
+use crate::records::ArrayRecords;
 
 /// A model; the tests of its residuals are made when they are first asked for.
 #[pyclass(module = "innovant._innovant", frozen)]
@@ -281,7 +281,7 @@ pub fn identify(
     json: &str,
 ) -> PyResult<Model> {
     let options = options(json)?;
-    let logs: Vec<Log> = recordings(&u, &y, dt, &inputs, &outputs)?;
-    let model = py.detach(|| Model::identified(&mut MemoryRecords::new(&logs)?, &options));
+    let mut records = ArrayRecords::new(&u, &y, dt, &inputs, &outputs).map_err(raise)?;
+    let model = py.detach(|| Model::identified(&mut records, &options));
     model.map_err(raise)
 }

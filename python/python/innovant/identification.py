@@ -35,7 +35,8 @@ def identify(
     """Identify a state-space model with its uncertainty, from recordings that may be in closed loop.
 
     The model is ``x[k+1] = A x[k] + B u[k] + K e[k]``, ``y[k] = C x[k] + D u[k] + e[k]`` with white ``e``, in
-    deviations from the operating point.
+    deviations from the operating point. The arrays are read where they are: nothing is copied as a whole or changed, and
+    no other thread should change them meanwhile.
 
     Parameters
     ----------
