@@ -45,6 +45,7 @@
 //! | [`covariance`] | the covariance of the parameters, and of what follows from them |
 //! | [`validate`] | fit, and residual tests that stay honest in closed loop and under coloured noise |
 //! | [`explain`](mod@explain) | what a simulation leaves out: located, named, fitted, proved |
+//! | [`batch`] | many logs, a model of each: parallel, resumable |
 //! | [`report`] | JSON documents with their schema, tables for people |
 //! | [`reproduce`] | the papers' experiments, run again, beside what the papers print |
 //! | [`cli`] | the command line |
@@ -57,6 +58,7 @@
 //!   [`covariance`]).
 //! - A. Chiuso, G. Picci, *Estimating the asymptotic variance of closed loop subspace estimators*.
 
+pub mod batch;
 pub mod cli;
 pub mod covariance;
 pub mod explain;

@@ -3,24 +3,19 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
-use super::deviations::{Deviations, judge};
-use super::numbers::{self, Window};
+use super::model_flags::ModelFlags;
 use super::output::{Output, check_distinct, note, paths, print};
 use super::progress::Progress;
 use super::roles::RoleFlags;
 use super::terminal::style;
 use super::{Outcome, Verbosity};
-use crate::identify::{
-    CovarianceKind, FileRecords, IdentifyError, Method, Model, Options, Order, Polish, Records,
-    Stochastic, Weight, identify_records, warnings_of_closed_loop,
-};
+use crate::identify::{FileRecords, IdentifyError, Model, Options, Order};
 use crate::log::{Roles, Source};
-use crate::moments::Detrend;
-use crate::report::ModelDocument;
 use crate::report::text::{ModelText, findings, model_text, verdict, wrapped};
-use crate::validate::{Relation, Validation};
+use crate::report::{ModelDocument, Request};
+use crate::validate::{TestedModel, Validation, identify_and_test};
 
 const EXAMPLE: &str = "Examples:
   innovant identify log.csv                        columns u* are inputs, y* outputs, t is time
@@ -51,121 +46,12 @@ pub(super) struct Flags {
     output: Option<PathBuf>,
 }
 
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Model")]
-struct ModelFlags {
-    /// Order: auto, N, or several to compare: 2,4,6 or 2..8 (8 included)
-    #[arg(long, default_value = "auto", value_parser = numbers::order, allow_negative_numbers = true)]
-    order: Order,
-    /// Past window in samples: auto or P
-    #[arg(long, default_value = "auto", value_parser = numbers::window, allow_negative_numbers = true)]
-    past: Window,
-    /// Future window in samples (for pbsid-opt at most the past one): auto or F
-    #[arg(long, default_value = "auto", value_parser = numbers::window, allow_negative_numbers = true)]
-    future: Window,
-    /// Algorithm
-    #[arg(long, value_enum, default_value = "pbsid-opt")]
-    method: Method,
-    /// Step that estimates K in the place of the method's own
-    #[arg(long, value_enum)]
-    stochastic: Option<Stochastic>,
-    /// Weight of the singular value decomposition [default: what suits the method]
-    #[arg(long, value_enum)]
-    weight: Option<WeightFlag>,
-    /// Polish to maximum likelihood: auto does for pbsid-opt, when the past window is long enough for it
-    #[arg(long, value_enum, default_value = "auto")]
-    polish: PolishFlag,
-    /// Covariance: from the model, or robust against a model that is not right (from blocks of the data)
-    #[arg(long, value_enum, default_value = "model")]
-    covariance: CovarianceFlag,
-    /// What is taken out of each channel first
-    #[arg(long, value_enum, default_value = "mean")]
-    detrend: DetrendFlag,
-    /// Estimate D: an input acts on an output in the same sample
-    #[arg(long)]
-    feedthrough: bool,
-    /// Known delay of the inputs in samples: one for all, or one for each
-    #[arg(
-        long,
-        value_name = "D[,D..]",
-        value_delimiter = ',',
-        allow_negative_numbers = true
-    )]
-    delay: Vec<u32>,
-    /// A stable model, guaranteed; the summary says what it cost
-    #[arg(long)]
-    stable: bool,
-    /// Seed of random draws
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum WeightFlag {
-    Identity,
-    Cva,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum PolishFlag {
-    Auto,
-    Always,
-    Never,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum CovarianceFlag {
-    Model,
-    Robust,
-}
-
-/// What is taken out of each channel.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum DetrendFlag {
-    Mean,
-    Linear,
-    None,
-}
-
-impl ModelFlags {
-    fn options(self) -> Options {
-        Options {
-            method: self.method,
-            stochastic: self.stochastic,
-            order: self.order,
-            past: self.past.0,
-            future: self.future.0,
-            weight: self.weight.map(|weight| match weight {
-                WeightFlag::Identity => Weight::Identity,
-                WeightFlag::Cva => Weight::Cva,
-            }),
-            polish: match self.polish {
-                PolishFlag::Auto => Polish::Auto,
-                PolishFlag::Always => Polish::Always,
-                PolishFlag::Never => Polish::Never,
-            },
-            covariance: match self.covariance {
-                CovarianceFlag::Model => CovarianceKind::Model,
-                CovarianceFlag::Robust => CovarianceKind::Robust,
-            },
-            detrend: match self.detrend {
-                DetrendFlag::Mean => Detrend::Mean,
-                DetrendFlag::Linear => Detrend::Linear,
-                DetrendFlag::None => Detrend::None,
-            },
-            feedthrough: self.feedthrough,
-            input_delay: self.delay.iter().map(|d| *d as usize).collect(),
-            stable: self.stable,
-            seed: self.seed,
-        }
-    }
-}
-
 /// What is to be done, checked.
 struct Plan {
     sources: Vec<Source>,
     roles: Roles,
     options: Options,
+    request: Request,
     output: Option<Output>,
 }
 
@@ -181,10 +67,12 @@ impl Plan {
                 .num_threads(threads.into())
                 .build_global()?;
         }
+        let (roles, options) = (flags.roles.roles(), flags.model.options());
         Ok(Self {
             sources: flags.logs,
-            roles: flags.roles.roles(),
-            options: flags.model.options(),
+            request: Request::new(&options, &roles),
+            roles,
+            options,
             output,
         })
     }
@@ -197,11 +85,8 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     let started = Instant::now();
     let mut records =
         FileRecords::open(plan.sources, plan.roles)?.with_progress(progress.callback());
-    let mut model =
-        identify_records(&mut records, &plan.options).map_err(|error| with_names(error, &logs))?;
-    check_recorded_once(&model)?;
-    let fitted = started.elapsed();
-    let tests = test(&mut records, &mut model)?;
+    let TestedModel { model, tests } =
+        identify_and_test(&mut records, &plan.options).map_err(|error| with_names(error, &logs))?;
     progress.finish();
     if say.verbose {
         for recording in &model.recordings {
@@ -214,9 +99,8 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
             ));
         }
         note(&format!(
-            "read and fitted in {:.3} s, residuals tested in {:.3} s\n",
-            fitted.as_secs_f64(),
-            (started.elapsed() - fitted).as_secs_f64()
+            "read, fitted and tested in {:.3} s\n",
+            started.elapsed().as_secs_f64()
         ));
     }
     let table = |model: &Model, tests: Option<&Validation>| {
@@ -232,7 +116,9 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         })
     };
     if let Some(output) = &plan.output {
-        let document = ModelDocument::new(&model)?.with_residual_tests(tests.clone());
+        let document = ModelDocument::new(&model)?
+            .with_residual_tests(tests.clone())
+            .with_request(plan.request);
         output.write(&document.to_json()?)?;
         if output.is_stdout() {
             if !say.quiet {
@@ -250,48 +136,6 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The residual tests; what they say against the model as a whole becomes one of its warnings.
-fn test(records: &mut dyn Records, model: &mut Model) -> anyhow::Result<Option<Validation>> {
-    let deviations = Deviations::of_records(records, model)?;
-    match judge(model, &deviations, Relation::Estimation, None) {
-        Ok(tests) => {
-            if let Some(summary) = &mut model.summary
-                && tests.closed_loop()
-            {
-                let found = warnings_of_closed_loop(summary);
-                summary.warnings.extend(found);
-            }
-            Ok(Some(tests))
-        }
-        Err(reason) => {
-            if let Some(summary) = &mut model.summary {
-                summary
-                    .warnings
-                    .push(format!("the residuals were not tested: {reason}"));
-            }
-            Ok(None)
-        }
-    }
-}
-
-/// Two files may be copies of one.
-fn check_recorded_once(model: &Model) -> anyhow::Result<()> {
-    for (index, recording) in model.recordings.iter().enumerate() {
-        let copy = model.recordings[..index]
-            .iter()
-            .find(|other| other.sha256.is_some() && other.sha256 == recording.sha256);
-        if let Some(copy) = copy {
-            anyhow::bail!(
-                "{} and {} hold the same bytes: their noise would count as twice the information; name each \
-                 recording once",
-                copy.name,
-                recording.name
-            );
-        }
-    }
-    Ok(())
-}
-
 /// What a person should know when the table goes nowhere.
 fn tell(model: &Model, tests: Option<&Validation>) {
     note(&wrapped("", &verdict(model, tests)));
@@ -307,6 +151,7 @@ fn tell(model: &Model, tests: Option<&Validation>) {
 fn with_names(error: IdentifyError, logs: &[String]) -> anyhow::Error {
     match error {
         IdentifyError::Log(error) => error.into(),
+        error @ IdentifyError::SameRecording { .. } => error.into(),
         error => {
             let more = match logs.len() {
                 0 | 1 => String::new(),

@@ -5,10 +5,11 @@
 //! message on standard error. When the reader of standard output has gone (`innovant ... | head`), the work
 //! counts as done.
 
+mod batch;
 mod completions;
-mod deviations;
 mod explain;
 mod identify;
+mod model_flags;
 mod numbers;
 mod output;
 mod progress;
@@ -39,6 +40,7 @@ const EXAMPLE: &str = "Example:
   innovant explain log.csv --simulation sim.csv    what did the simulation leave out?
   innovant simulate model.json input.csv > out.csv
   innovant show model.json
+  innovant batch logs/*.csv --output-dir models     a model of each of many logs
   innovant reproduce all                           the papers' tables and figures, run again
 
 Exit codes: 0 done; 1 the model or simulation was rejected; 2 an error.";
@@ -66,6 +68,7 @@ struct Verbosity {
 #[derive(Debug, Subcommand)]
 enum Command {
     Identify(identify::Flags),
+    Batch(batch::Flags),
     Explain(explain::Flags),
     Validate(validate::Flags),
     Simulate(simulate::Flags),
@@ -116,6 +119,7 @@ fn dispatch(cli: Cli) -> anyhow::Result<Outcome> {
             Ok(Outcome::Done)
         }
         Some(Command::Identify(flags)) => identify::run(flags, say),
+        Some(Command::Batch(flags)) => batch::run(flags, say),
         Some(Command::Explain(flags)) => explain::run(flags, say),
         Some(Command::Validate(flags)) => validate::run(flags, say),
         Some(Command::Simulate(flags)) => simulate::run(flags, say),

@@ -11,7 +11,7 @@ use crate::log::Source;
 /// Below this many bytes reading is over before a bar has been seen.
 const LARGE: u64 = 50 << 20;
 
-/// Progress of reading the recordings.
+/// Progress of reading the recordings, or of work on many things.
 #[derive(Debug)]
 pub(super) struct Progress {
     bar: Option<ProgressBar>,
@@ -58,6 +58,36 @@ impl Progress {
                 }
             }
         })
+    }
+
+    /// A bar over `count` things, if standard error is a terminal.
+    pub(super) fn counting(count: usize, what: &'static str, quiet: bool) -> Self {
+        if quiet || count < 2 || !io::stderr().is_terminal() {
+            return Self { bar: None };
+        }
+        let bar = ProgressBar::new(count as u64);
+        if let Ok(style) =
+            ProgressStyle::with_template("{wide_bar} {pos} of {len} {msg}, {eta} left")
+        {
+            bar.set_style(style);
+        }
+        bar.set_message(what);
+        Self { bar: Some(bar) }
+    }
+
+    /// One more of them is done.
+    pub(super) fn one_more(&self) {
+        if let Some(bar) = &self.bar {
+            bar.inc(1);
+        }
+    }
+
+    /// Writes to the terminal while the bar is out of the way.
+    pub(super) fn aside(&self, write: impl FnOnce()) {
+        match &self.bar {
+            Some(bar) => bar.suspend(write),
+            None => write(),
+        }
     }
 
     /// Takes the bar away.

@@ -11,7 +11,6 @@ use super::validate::check_sampling;
 use super::{Outcome, Verbosity};
 use crate::explain::Explanation;
 use crate::identify::{IdentifiedChannel, Model};
-use crate::linalg::spectral_radius;
 use crate::log::{Channel, Log, RoleNeed, Roles, Source, check_same_sampling, write_table};
 use crate::report::{is_explanation, parse_explanation, read_model};
 
@@ -107,7 +106,7 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         ));
     }
     let outputs = model.simulate(&inputs, start.as_ref())?;
-    check_finite(&model, &log, &outputs)?;
+    model.check_finite(&outputs, log.start_time)?;
     let columns: Vec<(&Channel, &[f64])> = model
         .outputs
         .iter()
@@ -222,22 +221,4 @@ fn initial_state(model: &Model, log: &Log, inputs: &[&[f64]]) -> anyhow::Result<
     }
     let outputs: Vec<&[f64]> = log.output_data.iter().map(Vec::as_slice).collect();
     Ok(model.initial_state_of(inputs, &outputs)?)
-}
-
-fn check_finite(model: &Model, log: &Log, outputs: &[Vec<f64>]) -> anyhow::Result<()> {
-    let first = outputs
-        .iter()
-        .enumerate()
-        .filter_map(|(o, column)| Some((column.iter().position(|y| !y.is_finite())?, o)))
-        .min();
-    let Some((sample, output)) = first else {
-        return Ok(());
-    };
-    let radius = spectral_radius(&model.system.a).unwrap_or(f64::NAN);
-    anyhow::bail!(
-        "the simulation diverges: output {} leaves the range of numbers at sample {sample}, t = {} s; the model is \
-         unstable (spectral radius {radius:.6}): identify it again with --stable, or simulate fewer samples",
-        model.outputs[output].channel.name,
-        log.start_time + sample as f64 * log.sample_time
-    )
 }

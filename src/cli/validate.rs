@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::deviations::{Deviations, Zero, judge};
 use super::numbers;
 use super::output::{check_distinct, print};
 use super::roles::RoleFlags;
@@ -15,7 +14,7 @@ use crate::log::{Log, Source, check_same_channels, check_same_sampling};
 use crate::moments::Detrend;
 use crate::report::text::validation_text;
 use crate::report::{read_model, to_json};
-use crate::validate::{Relation, Validation};
+use crate::validate::{Deviations, Relation, Validation, Zero, judge};
 
 const EXAMPLE: &str = "Examples:
   innovant validate model.json fresh.csv && echo the model holds

@@ -4,6 +4,7 @@ use super::delay::Aligner;
 use super::error::IdentifyError;
 use super::options::Options;
 use super::records::Records;
+use super::reduced::ReducedRecords;
 use crate::log::Channel;
 use crate::moments::{
     BlockAccumulator, Gram, LagAccumulator, LagMoments, PanelQr, RFactor, Trend, block_grams,
@@ -43,9 +44,12 @@ impl Data {
         options: &Options,
         lags: usize,
     ) -> Result<Self, IdentifyError> {
+        if let Some(reduced) = records.reduced() {
+            return Self::of_reduced(reduced, options, lags);
+        }
         let (inputs, outputs) = (records.inputs().len(), records.outputs().len());
         let q = inputs + outputs;
-        let delays = input_delays(&options.input_delay, inputs)?;
+        let delays = options.delays_of(inputs)?;
         let robust = options.may_need_blocks();
         let mut experiments = Vec::new();
         let mut blocks = Vec::new();
@@ -75,6 +79,50 @@ impl Data {
                 experiments.push(accumulator.moments());
             }
         }
+        let channels = (records.inputs(), records.outputs());
+        Self::assemble(experiments, blocks, delays, channels, options)
+    }
+
+    /// Moments that were made elsewhere.
+    fn of_reduced(
+        reduced: &ReducedRecords,
+        options: &Options,
+        lags: usize,
+    ) -> Result<Self, IdentifyError> {
+        if reduced.lags() < lags {
+            return Err(IdentifyError::Option(format!(
+                "the moments hold {} lags, and these windows and this method need {lags}: make the moments with the \
+                 options that the model is identified with",
+                reduced.lags()
+            )));
+        }
+        let delays = options.delays_of(reduced.inputs().len())?;
+        if delays != reduced.delays() {
+            return Err(IdentifyError::Option(format!(
+                "the moments were made with the known delays {:?}, and {delays:?} are asked for: make the moments with \
+                 the options that the model is identified with",
+                reduced.delays()
+            )));
+        }
+        let wanted = JACKKNIFE_BLOCKS.div_ceil(reduced.experiments());
+        let blocks = if options.may_need_blocks() {
+            reduced.blocks(wanted)
+        } else {
+            Vec::new()
+        };
+        let channels = (reduced.inputs(), reduced.outputs());
+        Self::assemble(reduced.wholes(), blocks, delays, channels, options)
+    }
+
+    fn assemble(
+        experiments: Vec<LagMoments>,
+        blocks: Vec<Vec<LagMoments>>,
+        delays: Vec<usize>,
+        (input_channels, output_channels): (&[Channel], &[Channel]),
+        options: &Options,
+    ) -> Result<Self, IdentifyError> {
+        let (inputs, outputs) = (input_channels.len(), output_channels.len());
+        let q = inputs + outputs;
         let trends: Vec<Trend> = experiments
             .iter()
             .map(|moments| moments.trend(options.detrend))
@@ -107,7 +155,7 @@ impl Data {
                 needed: smallest,
             });
         }
-        data.check_channels(records.inputs(), records.outputs())?;
+        data.check_channels(input_channels, output_channels)?;
         // Unit rms of what is left after detrending.
         let spread = data.gram(0);
         data.scale = (0..q)
@@ -199,10 +247,15 @@ impl Data {
     /// orthogonal panels of the data, which are read again.
     ///
     /// # Errors
-    /// When reading again fails.
+    /// When reading again fails, or is needed and only moments are left.
     pub fn factor(&self, records: &mut dyn Records, past: usize) -> Result<RFactor, IdentifyError> {
         if let Ok(factor) = RFactor::from_gram(&self.gram(past), self.inputs, &self.scale) {
             return Ok(factor);
+        }
+        if records.reduced().is_some() {
+            return Err(IdentifyError::MomentsOnly {
+                reason: "the moments are too ill-conditioned to be factored",
+            });
         }
         let outputs = self.channels() - self.inputs;
         let mut panels = PanelQr::new(past, &self.scale);
@@ -230,19 +283,6 @@ impl Data {
                 RFactor::from_gram(&whole.without(&block), self.inputs, &self.scale).ok()
             })
             .collect()
-    }
-}
-
-/// One delay an input.
-fn input_delays(asked: &[usize], inputs: usize) -> Result<Vec<usize>, IdentifyError> {
-    match asked {
-        [] => Ok(vec![0; inputs]),
-        [one] => Ok(vec![*one; inputs]),
-        many if many.len() == inputs => Ok(many.to_vec()),
-        many => Err(IdentifyError::Option(format!(
-            "--delay has {} values, but there are {inputs} inputs: give one value for all, or one for each",
-            many.len()
-        ))),
     }
 }
 

@@ -105,6 +105,25 @@ pub enum IdentifyError {
         /// Which regressors.
         what: &'static str,
     },
+    /// Two recordings that are copies of one.
+    #[error(
+        "{first} and {second} hold the same bytes: their noise would count as twice the information; name each \
+         recording once"
+    )]
+    SameRecording {
+        /// Name of the one.
+        first: String,
+        /// Name of the other.
+        second: String,
+    },
+    /// Samples are needed, and only moments are there.
+    #[error(
+        "{reason}, and this takes the samples themselves, of which only moments are left; identify on one machine"
+    )]
+    MomentsOnly {
+        /// What needs them.
+        reason: &'static str,
+    },
     /// Options that do not fit the recording.
     #[error("{0}")]
     Option(String),

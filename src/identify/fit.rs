@@ -52,17 +52,10 @@ pub struct Fit {
 /// # Errors
 /// [`IdentifyError`] says what is wrong with the recordings or the options.
 pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, IdentifyError> {
-    let q = records.inputs().len() + records.outputs().len();
-    let outputs = records.outputs().len();
-    check_windows(options, q, outputs)?;
-    let longest = horizon::LONGEST_PAST_ON_DEMAND
-        .min((LARGEST_AUTOMATIC_FACTOR / q).saturating_sub(1))
-        .max(1);
-    let longest = options.past.unwrap_or(longest);
-    let lags = options.method.lags(longest, options.future);
-    let lags = options
-        .stochastic
-        .map_or(lags, |step| lags.max(step.lags(longest, options.future)));
+    let (r, outputs) = (records.inputs().len(), records.outputs().len());
+    let q = r + outputs;
+    let lags = lags_needed(options, r, outputs)?;
+    let longest = longest_past(options, q);
     let data = Data::read(records, options, lags)?;
     let longest = longest.min(data.lags());
 
@@ -145,6 +138,33 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
             explanation,
         },
     )
+}
+
+/// Longest past window that comes into question for `q` channels.
+fn longest_past(options: &Options, q: usize) -> usize {
+    options.past.unwrap_or_else(|| {
+        horizon::LONGEST_PAST_ON_DEMAND
+            .min((LARGEST_AUTOMATIC_FACTOR / q).saturating_sub(1))
+            .max(1)
+    })
+}
+
+/// Lags that the moments of `inputs` inputs and `outputs` outputs must hold.
+///
+/// # Errors
+/// [`IdentifyError`] for windows or orders that are impossible.
+pub(super) fn lags_needed(
+    options: &Options,
+    inputs: usize,
+    outputs: usize,
+) -> Result<usize, IdentifyError> {
+    let q = inputs + outputs;
+    check_windows(options, q, outputs)?;
+    let longest = longest_past(options, q);
+    let lags = options.method.lags(longest, options.future);
+    Ok(options
+        .stochastic
+        .map_or(lags, |step| lags.max(step.lags(longest, options.future))))
 }
 
 fn check_windows(options: &Options, q: usize, outputs: usize) -> Result<(), IdentifyError> {

@@ -5,6 +5,7 @@
 //! | file | step | source |
 //! |---|---|---|
 //! | `records`, `delay`, `data` | recordings, streamed once, aligned, as moments | |
+//! | `reduced` | recordings of which only moments are left: pieces of a cluster's work | |
 //! | `horizon` | past window by Akaike's criterion, future window | |
 //! | `varx` | the high-order vector ARX model | van Wingerden (22)-(23) |
 //! | `method` | which algorithm: one enum variant and one module each | |
@@ -45,6 +46,7 @@ mod pbsid_opt;
 pub mod pem;
 mod polish;
 mod records;
+mod reduced;
 mod scaling;
 mod select;
 mod simulate;
@@ -70,6 +72,7 @@ pub use order::OrderEvidence;
 pub use pbsid_opt::{Decomposition, Estimate, Weight, decompose, system_matrices};
 pub use polish::{Effort, Polished, coefficient_cost, polish, predictor_coefficients};
 pub use records::{FileRecords, MemoryRecords, ReadProgress, Recording, Records};
+pub use reduced::{ReducedRecords, SAMPLES_KEPT};
 pub use source::Source;
 pub use stochastic::Stochastic;
 pub use summary::{Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary};

@@ -2,13 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::error::IdentifyError;
 use super::method::Method;
 use super::pbsid_opt::Weight;
 use super::stochastic::Stochastic;
 use crate::moments::Detrend;
 
 /// Which state dimension.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Order {
     /// By singular values, with the chi-square test as referee.
     #[default]
@@ -60,7 +62,7 @@ pub enum CovarianceKind {
 }
 
 /// Options of [`identify`](super::identify()); the default is what the command line does without flags.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Options {
     /// Algorithm.
     pub method: Method,
@@ -92,6 +94,19 @@ pub struct Options {
 }
 
 impl Options {
+    /// The known delay of each of `inputs` inputs.
+    pub(super) fn delays_of(&self, inputs: usize) -> Result<Vec<usize>, IdentifyError> {
+        match self.input_delay.as_slice() {
+            [] => Ok(vec![0; inputs]),
+            [one] => Ok(vec![*one; inputs]),
+            many if many.len() == inputs => Ok(many.to_vec()),
+            many => Err(IdentifyError::Option(format!(
+                "--delay has {} values, but there are {inputs} inputs: give one value for all, or one for each",
+                many.len()
+            ))),
+        }
+    }
+
     /// Whether `--polish auto` polishes.
     pub(super) fn polishes_by_default(&self) -> bool {
         self.method.polishes_by_default() && self.stochastic.is_none()

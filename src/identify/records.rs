@@ -1,5 +1,6 @@
 //! Where the samples come from: memory, or files that are streamed.
 
+use super::reduced::ReducedRecords;
 use crate::log::{
     Block, Channel, Log, LogError, LogReader, LogSummary, RoleNeed, Roles, Source,
     check_same_channels, check_same_sampling,
@@ -40,6 +41,11 @@ pub trait Records {
     fn recordings(&self) -> Vec<Recording>;
     /// Samples of the experiment that a second reading gets without reading a file again.
     fn kept_samples(&self, experiment: usize) -> usize;
+    /// The recordings as moments, where nothing else is left of them: [`Records::read`] then gives only what
+    /// [`Records::kept_samples`] says.
+    fn reduced(&self) -> Option<&ReducedRecords> {
+        None
+    }
     /// Streams one experiment: blocks of columns, inputs then outputs. A `limit` ends a second reading
     /// after so many samples; the first reading is always whole.
     ///

@@ -3,7 +3,8 @@
 use nalgebra::DVector;
 
 use super::model::Model;
-use crate::model::{ModelError, estimate_initial_state};
+use crate::linalg::spectral_radius;
+use crate::model::{ModelError, Prediction, estimate_initial_state};
 
 impl Model {
     /// Inputs as deviations from the operating point, delayed by the known delays; before the first sample
@@ -52,6 +53,70 @@ impl Model {
         Ok(outputs)
     }
 
+    /// Outputs as deviations from the operating point.
+    fn output_deviations(&self, outputs: &[&[f64]]) -> Result<Vec<Vec<f64>>, ModelError> {
+        if outputs.len() != self.outputs.len() {
+            return Err(ModelError::Channels {
+                kind: "outputs",
+                given: outputs.len(),
+                expected: self.outputs.len(),
+            });
+        }
+        Ok(self
+            .outputs
+            .iter()
+            .zip(outputs)
+            .map(|(channel, column)| column.iter().map(|y| y - channel.level).collect())
+            .collect())
+    }
+
+    /// One-step predictions and innovations of a recording, in its units; known delays applied.
+    ///
+    /// The initial state is that of the operating point unless given
+    /// ([`initial_state_of`](Model::initial_state_of) has the one that fits best).
+    ///
+    /// # Errors
+    /// [`ModelError`] when the number or the length of the channels is wrong.
+    pub fn predict(
+        &self,
+        inputs: &[&[f64]],
+        outputs: &[&[f64]],
+        initial_state: Option<&DVector<f64>>,
+    ) -> Result<Prediction, ModelError> {
+        let inputs = self.input_deviations(inputs)?;
+        let outputs = self.output_deviations(outputs)?;
+        let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
+        let outputs: Vec<&[f64]> = outputs.iter().map(Vec::as_slice).collect();
+        let mut prediction = self.system.one_step(&inputs, &outputs, initial_state)?;
+        for (column, channel) in prediction.predicted.iter_mut().zip(&self.outputs) {
+            for value in column {
+                *value += channel.level;
+            }
+        }
+        Ok(prediction)
+    }
+
+    /// Refuses simulated outputs that have left the range of numbers; `start_time` is that of the first sample.
+    ///
+    /// # Errors
+    /// [`ModelError::Diverges`] says which output, when, and why.
+    pub fn check_finite(&self, outputs: &[Vec<f64>], start_time: f64) -> Result<(), ModelError> {
+        let first = outputs
+            .iter()
+            .enumerate()
+            .filter_map(|(o, column)| Some((column.iter().position(|y| !y.is_finite())?, o)))
+            .min();
+        let Some((sample, output)) = first else {
+            return Ok(());
+        };
+        Err(ModelError::Diverges {
+            output: self.outputs[output].channel.name.clone(),
+            sample,
+            time: start_time + sample as f64 * self.system.sample_time,
+            spectral_radius: spectral_radius(&self.system.a).unwrap_or(f64::NAN),
+        })
+    }
+
     /// The state at the first sample that explains a recording best (least squares of the innovations),
     /// inputs and outputs in the units of the recording.
     ///
@@ -63,12 +128,7 @@ impl Model {
         outputs: &[&[f64]],
     ) -> Result<DVector<f64>, ModelError> {
         let inputs = self.input_deviations(inputs)?;
-        let outputs: Vec<Vec<f64>> = self
-            .outputs
-            .iter()
-            .zip(outputs)
-            .map(|(channel, column)| column.iter().map(|y| y - channel.level).collect())
-            .collect();
+        let outputs = self.output_deviations(outputs)?;
         let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
         let outputs: Vec<&[f64]> = outputs.iter().map(Vec::as_slice).collect();
         estimate_initial_state(

@@ -86,8 +86,13 @@ impl<'a> Source<'a> {
     /// channel, inputs then outputs. Holds the whole experiment in memory: only for methods that need every sample.
     ///
     /// # Errors
-    /// When reading fails.
+    /// When reading fails, or when only moments are left.
     pub fn signals(&mut self, experiment: usize) -> Result<Vec<Vec<f64>>, IdentifyError> {
+        if self.records.reduced().is_some() {
+            return Err(IdentifyError::MomentsOnly {
+                reason: "this method looks at every sample",
+            });
+        }
         let trend = self.data.trend(experiment);
         let delays = self.data.delays();
         let mut columns = deviations(self.records, experiment, delays, trend, None)?;

@@ -47,6 +47,7 @@ mod record;
 mod roles;
 mod sampling;
 mod source;
+mod table;
 #[cfg(test)]
 mod tests;
 mod writer;
@@ -60,4 +61,5 @@ pub use reader::{
 pub use record::Log;
 pub use roles::{RoleNeed, Roles};
 pub use source::Source;
+pub use table::{TableRoles, time_base_of};
 pub use writer::{CsvWriter, write_table};

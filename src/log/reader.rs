@@ -275,7 +275,11 @@ impl LogReader {
     }
 }
 
-fn time_base(header: &Header, index: usize, first_line: u64) -> Result<Sampling, LogError> {
+pub(super) fn time_base(
+    header: &Header,
+    index: usize,
+    first_line: u64,
+) -> Result<Sampling, LogError> {
     let unit = header
         .channels
         .get(index)

@@ -9,7 +9,7 @@ use super::header::Header;
 /// A name matches a header with or without the unit in brackets (`force` finds `force [N]`), with the same case if it
 /// can be, in any case if only one column fits. What is not asked for goes by the header: u or U starts an input, y or
 /// Y an output, `t` or `time` is the time.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Roles {
     /// Input columns, in the order wanted.
     pub inputs: Option<Vec<String>>,

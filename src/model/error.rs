@@ -84,6 +84,22 @@ pub enum ModelError {
         /// Columns of `T`.
         columns: usize,
     },
+    /// A simulation that left the range of numbers.
+    #[error(
+        "the simulation diverges: output {output} leaves the range of numbers at sample {sample}, t = {time} s; the \
+         model is unstable (spectral radius {spectral_radius:.6}): identify it again with --stable, or simulate fewer \
+         samples"
+    )]
+    Diverges {
+        /// Name of the output.
+        output: String,
+        /// First sample that is no number, from 0.
+        sample: usize,
+        /// Its time in seconds.
+        time: f64,
+        /// Largest modulus of a pole.
+        spectral_radius: f64,
+    },
     /// A factorisation failed.
     #[error(transparent)]
     Linalg(#[from] LinalgError),

@@ -1,6 +1,7 @@
 //! The moments of one record, and how two adjacent records become one.
 
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 use super::gram::Gram;
 use super::trend::{Detrend, Trend};
@@ -8,7 +9,7 @@ use super::trend::{Detrend, Trend};
 /// Lag correlations of one record with what is needed to correct them at both ends.
 ///
 /// All sums are of samples from which `reference` was subtracted.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LagMoments {
     pub(super) channels: usize,
     pub(super) lags: usize,
@@ -40,6 +41,19 @@ impl LagMoments {
     /// Largest lag.
     pub fn lags(&self) -> usize {
         self.lags
+    }
+
+    /// Whether all parts have the sizes that channels, lags and samples say: not so in a damaged document.
+    pub fn is_consistent(&self) -> bool {
+        let (q, ends) = (self.channels, self.lags.min(self.samples));
+        self.correlations.len() == self.lags + 1
+            && self.correlations.iter().all(|c| c.shape() == (q, q))
+            && [&self.reference, &self.sum, &self.index_sum]
+                .iter()
+                .all(|v| v.len() == q)
+            && [&self.head, &self.tail].iter().all(|columns| {
+                columns.len() == q && columns.iter().all(|column| column.len() == ends)
+            })
     }
 
     /// Mean of each channel.

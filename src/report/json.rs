@@ -11,7 +11,10 @@ const LINE_WIDTH: usize = 110;
 /// The document as text, ending in a line break.
 ///
 /// Numbers are written in the shortest form that is read back exactly.
-pub(crate) fn to_json<T: Serialize + ?Sized>(value: &T) -> serde_json::Result<String> {
+///
+/// # Errors
+/// [`serde_json::Error`] for a value that JSON cannot hold, such as a map whose keys are no text.
+pub fn to_json<T: Serialize + ?Sized>(value: &T) -> serde_json::Result<String> {
     let mut bytes = Vec::new();
     value.serialize(&mut Serializer::with_formatter(
         &mut bytes,

@@ -8,6 +8,7 @@ use super::error::DocumentError;
 use super::json::to_json;
 use super::matrix::Rows;
 use super::packed::CovarianceDocument;
+use super::request::Request;
 use crate::covariance::{Root, StaticGain, invariants};
 use crate::identify::{
     Asked, Diagnostics, Horizons, IdentifiedChannel, Method, Model, Recording, Stochastic, Weight,
@@ -153,6 +154,9 @@ pub struct Provenance {
     /// The recordings that the model was estimated from.
     #[serde(default)]
     pub recordings: Vec<Recording>,
+    /// What was asked for, to the letter: the same request on the same recordings gives the same model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub request: Option<Request>,
 }
 
 impl ModelDocument {
@@ -220,6 +224,7 @@ impl ModelDocument {
                 tool: "innovant".to_owned(),
                 version: env!("CARGO_PKG_VERSION").to_owned(),
                 recordings: recordings.clone(),
+                request: None,
             }),
         })
     }
@@ -229,6 +234,15 @@ impl ModelDocument {
     pub fn with_residual_tests(mut self, tests: Option<Validation>) -> Self {
         if let Some(diagnostics) = &mut self.diagnostics {
             diagnostics.residual_tests = tests;
+        }
+        self
+    }
+
+    /// Adds what was asked for.
+    #[must_use]
+    pub fn with_request(mut self, request: Request) -> Self {
+        if let Some(provenance) = &mut self.provenance {
+            provenance.request = Some(request);
         }
         self
     }

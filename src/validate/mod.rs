@@ -35,15 +35,19 @@
 //! | `filters`, `sensitivity`, `curvature` | what the errors of the parameters do, first and second order |
 //! | `statistic` | statistic, degrees of freedom, bounds |
 //! | `innovation_size` | residual variance against the stated one |
+//! | `deviations` | recordings in the units of the user, as a model sees them |
+//! | `identified` | identification with the tests that belong to it |
 //! | `verdict` | which tests reject together, and the sentences |
 //!
 //! Source: Ljung, *System Identification*, 2nd ed. (1999), chapter 16.
 
 mod check;
 mod curvature;
+mod deviations;
 mod error;
 mod filters;
 mod fit_measure;
+mod identified;
 mod innovation_size;
 mod options;
 mod own_past;
@@ -57,7 +61,9 @@ mod verdict;
 #[cfg(test)]
 mod tests;
 
+pub use deviations::{Deviations, Zero, judge};
 pub use error::ValidateError;
+pub use identified::{TestedModel, identify_and_test, test_residuals};
 pub use options::{RecordView, Relation, ValidationOptions};
 pub use result::{
     FitMeasure, InnovationSize, OutputFit, OutputSize, PairCorrelation, ResidualTest, Strongest,

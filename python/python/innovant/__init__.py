@@ -1,5 +1,34 @@
-"""State-space models with honest uncertainty from recordings, also in closed loop."""
+"""State-space models with honest uncertainty from recordings, also in closed loop; and what a simulation leaves out.
 
-from ._innovant import Model, __version__, identify
+>>> import innovant
+>>> u, y, dt = innovant.examples.closed_loop(2000)
+>>> model = innovant.identify(u, y, dt=dt)
+>>> print(model.verdict)
+Order 4 model of 2 outputs from 2 inputs, 2000 samples, 1 s: nothing left to explain
+"""
 
-__all__ = ["Model", "__version__", "identify"]
+from . import examples
+from ._innovant import InnovantError, __version__
+from .explanation import Explanation, explain
+from .identification import identify
+from .model import Model
+from .moments import Moments
+from .record import Record
+from .responses import FrequencyResponse, Roots, StepResponse
+from .validation import Validation
+
+__all__ = [
+    "Explanation",
+    "FrequencyResponse",
+    "InnovantError",
+    "Model",
+    "Moments",
+    "Record",
+    "Roots",
+    "StepResponse",
+    "Validation",
+    "__version__",
+    "examples",
+    "explain",
+    "identify",
+]

@@ -1,27 +1,26 @@
-//! Recordings as the model sees them: deviations from the operating point, known delays taken out.
+//! Recordings as a model sees them: deviations from the operating point, known delays taken out; and the model
+//! judged on them.
 
+use super::{RecordView, Relation, ValidateError, Validation, ValidationOptions, validate};
 use crate::identify::{AlignedColumns, IdentifiedChannel, Model, Records};
 use crate::log::{Log, LogError};
 use crate::moments::{Detrend, LagAccumulator, Trend};
 use crate::report::names;
-use crate::validate::{
-    RecordView, Relation, ValidateError, Validation, ValidationOptions, validate,
-};
 
 /// Values of a long recording that the residual tests look at, from its beginning: more do not sharpen their
 /// verdict, but cost time and memory.
 const VALUES_TESTED: usize = 1 << 19;
 
-/// One experiment.
+/// One experiment: columns relative to what stands for zero, inputs aligned with the outputs.
 #[derive(Debug)]
-pub(super) struct Deviations {
+pub struct Deviations {
     inputs: Vec<Vec<f64>>,
     outputs: Vec<Vec<f64>>,
 }
 
 /// What stands for zero in an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Zero {
+pub enum Zero {
     /// The operating point of the model.
     Levels,
     /// What this experiment says by itself.
@@ -30,7 +29,7 @@ pub(super) enum Zero {
 
 impl Zero {
     /// That of a recording which the model was estimated from.
-    pub(super) fn of_estimation(model: &Model) -> Self {
+    pub fn of_estimation(model: &Model) -> Self {
         let detrend = model.summary.as_ref().map(|s| s.options.detrend);
         match detrend {
             // One recording: its mean is the operating point, of the whole of it and not only of a part.
@@ -61,17 +60,17 @@ impl Deviations {
     }
 
     /// Of a recording in memory, whose channels are those of the model.
-    pub(super) fn of_log(log: &Log, model: &Model, zero: Zero) -> Self {
+    pub fn of_log(log: &Log, model: &Model, zero: Zero) -> Self {
         let mut aligned = aligned(model);
         aligned.push(&log.channel_data());
         Self::new(aligned.columns, model, zero)
     }
 
     /// Of what is still in memory of the recordings that the model was just estimated from.
-    pub(super) fn of_records(
-        records: &mut dyn Records,
-        model: &Model,
-    ) -> Result<Vec<Self>, LogError> {
+    ///
+    /// # Errors
+    /// When reading them again fails.
+    pub fn of_records(records: &mut dyn Records, model: &Model) -> Result<Vec<Self>, LogError> {
         let channels = model.inputs.len() + model.outputs.len();
         let experiments = records.experiments();
         let most = VALUES_TESTED / (channels * experiments).max(1);
@@ -93,8 +92,11 @@ impl Deviations {
     }
 }
 
-/// Judges a model on records.
-pub(super) fn judge(
+/// Judges a model on records; `level` is the probability that a right model is rejected, 0.01 without it.
+///
+/// # Errors
+/// As [`validate`](super::validate()).
+pub fn judge(
     model: &Model,
     records: &[Deviations],
     relation: Relation,

@@ -1,0 +1,125 @@
+//! What a simulation leaves out.
+
+use std::path::PathBuf;
+
+use innovant::explain::{Options, Simulation, explain as explain_logs};
+use innovant::log::write_file_atomically;
+use innovant::report::text::explanation_text;
+use innovant::report::{explanation_page, parse_explanation, to_json};
+use numpy::{PyArray1, PyArray2, ToPyArray};
+use pyo3::prelude::*;
+
+use crate::arrays::{Samples, columns, recording, recording_name, recordings, samples, slices};
+use crate::errors::raise;
+use crate::model::Model;
+
+/// The answer, ready to be simulated.
+#[pyclass(module = "innovant._innovant", frozen)]
+pub struct Explanation {
+    explanation: innovant::explain::Explanation,
+}
+
+#[pymethods]
+impl Explanation {
+    /// The document that the command line writes.
+    fn to_json(&self) -> PyResult<String> {
+        to_json(&self.explanation).map_err(raise)
+    }
+
+    #[staticmethod]
+    fn from_json(name: &str, text: &str) -> PyResult<Self> {
+        let explanation = parse_explanation(name, text).map_err(raise)?;
+        Ok(Self { explanation })
+    }
+
+    /// What the command line prints.
+    fn text(&self) -> String {
+        explanation_text(&self.explanation)
+    }
+
+    /// Whether simulating takes the answer of the original simulator.
+    fn needs_simulation(&self) -> bool {
+        self.explanation.model.reference.is_some()
+    }
+
+    /// Headers of the inputs, of the outputs.
+    fn names(&self) -> (Vec<String>, Vec<String>) {
+        let model = &self.explanation.model;
+        let of = |list: &[innovant::log::Channel]| list.iter().map(ToString::to_string).collect();
+        (of(&model.inputs), of(&model.outputs))
+    }
+
+    /// Writes the page; the file appears whole or not at all.
+    fn report(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        py.detach(|| {
+            let page = explanation_page(&self.explanation).map_err(raise)?;
+            write_file_atomically(&path, page.as_bytes()).map_err(raise)
+        })
+    }
+
+    /// Free run on inputs of samples x channels, from rest or a state, corrected by the simulator's answer.
+    fn simulate<'py>(
+        &self,
+        py: Python<'py>,
+        u: Samples<'py>,
+        x0: Option<Vec<f64>>,
+        simulation: Option<Samples<'py>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (inputs, given) = (columns(&u), simulation.as_ref().map(columns));
+        let outputs = py.detach(|| {
+            let given = given.as_deref().map(slices);
+            self.explanation
+                .model
+                .simulate(&slices(&inputs), x0.as_deref(), given.as_deref())
+        });
+        Ok(samples(py, &outputs.map_err(raise)?))
+    }
+
+    /// The state at the first sample that fits a recording best.
+    fn initial_state<'py>(
+        &self,
+        py: Python<'py>,
+        u: Samples<'py>,
+        y: Samples<'py>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (inputs, outputs) = (columns(&u), columns(&y));
+        let state = py.detach(|| {
+            self.explanation
+                .model
+                .estimate_initial_state(&slices(&inputs), &slices(&outputs))
+        });
+        Ok(state.map_err(raise)?.to_pyarray(py))
+    }
+}
+
+/// Compares recordings with a simulation: a model, or simulated outputs.
+#[pyfunction]
+#[allow(clippy::too_many_arguments, reason = "called by one Python function")]
+pub fn explain(
+    py: Python<'_>,
+    u: Vec<Samples<'_>>,
+    y: Vec<Samples<'_>>,
+    dt: f64,
+    names: (Vec<String>, Vec<String>),
+    model: Option<PyRef<'_, Model>>,
+    outputs: Vec<Samples<'_>>,
+    without: Vec<String>,
+    seed: u64,
+) -> PyResult<Explanation> {
+    let logs = recordings(&u, &y, dt, &names.0, &names.1)?;
+    let simulation = match model {
+        Some(model) => Simulation::Model(Box::new(model.model.clone()), "simulation".to_owned()),
+        None => {
+            let count = outputs.len();
+            let simulated = outputs.iter().enumerate().map(|(index, y)| {
+                let name = recording_name(index, count).replace("recording", "simulation");
+                recording(&name, dt, (&[], &names.1), (Vec::new(), columns(y)))
+            });
+            Simulation::Outputs(simulated.collect::<PyResult<_>>()?)
+        }
+    };
+    let options = Options { without, seed };
+    let explanation = py.detach(|| explain_logs(&logs, &simulation, &options));
+    let explanation = explanation.map_err(raise)?;
+    Ok(Explanation { explanation })
+}

@@ -1,0 +1,103 @@
+//! One log: the model that is there already, or a new one.
+
+use std::fs::{self, File};
+use std::io;
+use std::path::Path;
+use std::time::Instant;
+
+use sha2::{Digest, Sha256};
+
+use super::Batch;
+use super::row::{Row, Status};
+use crate::identify::FileRecords;
+use crate::log::{Source, write_file_atomically};
+use crate::report::{ModelDocument, ReadModel, Request, read_model};
+use crate::validate::{TestedModel, identify_and_test};
+
+/// Bytes hashed at a time.
+const BUFFER: usize = 1 << 16;
+
+/// The row of one log; whatever goes wrong is told in it.
+pub(super) fn run(log: &Path, model: &Path, batch: &Batch) -> Row {
+    let started = Instant::now();
+    let request = Request::new(&batch.options, &batch.roles);
+    let row = match kept(log, model, &request).filter(|_| !batch.again) {
+        Some(read) => Row::of_model(
+            log,
+            Status::Kept,
+            &read.model,
+            read.document.residual_tests(),
+        ),
+        None => match identified(log, model, batch, request) {
+            Ok(tested) => Row::of_model(
+                log,
+                Status::Identified,
+                &tested.model,
+                tested.tests.as_ref(),
+            ),
+            Err(message) => {
+                // What an earlier content of this log left is not the model of this one.
+                if log.is_file() {
+                    let _ = fs::remove_file(model);
+                }
+                Row::failed(log, message)
+            }
+        },
+    };
+    Row {
+        seconds: started.elapsed().as_secs_f64(),
+        ..row
+    }
+}
+
+/// The model that was made from these bytes as asked; `None` when there is none, or it cannot be read.
+fn kept(log: &Path, model: &Path, request: &Request) -> Option<ReadModel> {
+    // Looked at first: a log need not be read where no model is.
+    fs::metadata(model).ok()?;
+    let read = read_model(model).ok()?;
+    let provenance = read.document.provenance.as_ref()?;
+    if provenance.request.as_ref() != Some(request)
+        || provenance.version != env!("CARGO_PKG_VERSION")
+    {
+        return None;
+    }
+    let [recording] = provenance.recordings.as_slice() else {
+        return None;
+    };
+    let sha256 = recording.sha256.clone()?;
+    (sha256_of(log).ok()? == sha256).then_some(read)
+}
+
+fn identified(
+    log: &Path,
+    model: &Path,
+    batch: &Batch,
+    request: Request,
+) -> Result<TestedModel, String> {
+    let records = FileRecords::open(vec![Source::from(log.to_owned())], batch.roles.clone());
+    let mut records = records.map_err(|error| error.to_string())?;
+    let tested =
+        identify_and_test(&mut records, &batch.options).map_err(|error| error.to_string())?;
+    let document = ModelDocument::new(&tested.model)
+        .map_err(|error| error.to_string())?
+        .with_residual_tests(tested.tests.clone())
+        .with_request(request);
+    let text = document.to_json().map_err(|error| error.to_string())?;
+    write_file_atomically(model, text.as_bytes()).map_err(|error| error.to_string())?;
+    Ok(tested)
+}
+
+/// SHA-256 of the bytes of a file, hexadecimal, as [`crate::identify::Recording`] has it.
+fn sha256_of(path: &Path) -> io::Result<String> {
+    let mut file = File::open(path)?;
+    let mut hash = Sha256::new();
+    let mut buffer = vec![0; BUFFER];
+    loop {
+        let count = io::Read::read(&mut file, &mut buffer)?;
+        if count == 0 {
+            break;
+        }
+        hash.update(&buffer[..count]);
+    }
+    Ok(hash.finalize().iter().map(|b| format!("{b:02x}")).collect())
+}
