@@ -136,11 +136,11 @@ pub(super) fn kind(of: Verdict) -> &'static str {
 /// The class of a verdict in the style sheet.
 pub(super) fn class(of: Verdict) -> &'static str {
     match of {
-        Verdict::Consistent => "consistent",
-        Verdict::Parameters => "parameters",
-        Verdict::Named => "named",
-        Verdict::Family => "family",
-        Verdict::Unexplained => "unexplained",
+        Verdict::Consistent => "is-consistent",
+        Verdict::Parameters => "is-parameters",
+        Verdict::Named => "is-named",
+        Verdict::Family => "is-family",
+        Verdict::Unexplained => "is-unexplained",
     }
 }
 

@@ -2,25 +2,23 @@
 
 use serde::Serialize;
 
-use super::bars::{Chart, chart};
-use super::pictures::group;
-use crate::report::drawing::number::number;
-use crate::report::drawing::plot::Group;
-use crate::reproduce::{Agreement, Comparison, Origin, Reproduction, Table};
+use super::head::{Column, Head, Row, Table, sections};
+use super::number::number;
+use super::pictures::{bars, figure};
+use super::plot::Group;
+use crate::reproduce::{self, Agreement, Comparison, Origin, Reproduction};
 
 /// The page as the template sees it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct View {
-    experiment: String,
-    title: String,
+    #[serde(flatten)]
+    head: Head,
     paper: String,
-    version: String,
     runs: String,
-    command: String,
+    again: String,
     counts: Vec<Count>,
     comparison: Vec<CompareRow>,
     figures: Vec<Group>,
-    charts: Vec<Chart>,
     tables: Vec<NumberTable>,
     paper_facts: Vec<[String; 2]>,
     our_facts: Vec<[String; 2]>,
@@ -49,16 +47,7 @@ struct NumberTable {
     id: String,
     title: String,
     caption: String,
-    rows_are: String,
-    columns: Vec<String>,
-    rows: Vec<NumberRow>,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct NumberRow {
-    name: String,
-    printed: bool,
-    values: Vec<String>,
+    table: Table,
 }
 
 /// Symbols that plain text has to do without.
@@ -96,26 +85,30 @@ fn counts(of: &[Comparison]) -> Vec<Count> {
         .collect()
 }
 
-fn table(of: &Table) -> NumberTable {
+fn table(of: &reproduce::Table) -> NumberTable {
+    let column = |name: String, words| Column { name, words };
+    let numbers = of.columns.iter().map(|c| column(typeset(c), false));
+    let row = |row: &reproduce::Row| {
+        let numbers = row.values.iter();
+        let numbers = numbers.map(|v| number(v.unwrap_or(f64::NAN), of.digits));
+        Row {
+            cells: std::iter::once(row.name.clone()).chain(numbers).collect(),
+            marked: row.printed,
+        }
+    };
+    let table = Table {
+        columns: std::iter::once(column(of.rows_are.clone(), true))
+            .chain(numbers)
+            .collect(),
+        rows: of.rows.iter().map(row).collect(),
+        class: "wide printed",
+        ..Table::default()
+    };
     NumberTable {
         id: of.id.clone(),
         title: of.title.clone(),
         caption: of.caption.clone(),
-        rows_are: of.rows_are.clone(),
-        columns: of.columns.iter().map(|c| typeset(c)).collect(),
-        rows: of
-            .rows
-            .iter()
-            .map(|row| NumberRow {
-                name: row.name.clone(),
-                printed: row.printed,
-                values: row
-                    .values
-                    .iter()
-                    .map(|v| number(v.unwrap_or(f64::NAN), of.digits))
-                    .collect(),
-            })
-            .collect(),
+        table,
     }
 }
 
@@ -128,11 +121,28 @@ pub(super) fn view(of: &Reproduction) -> View {
             .map(|f| [f.name.clone(), typeset(&f.value)])
             .collect()
     };
+    let figures: Vec<Group> = of
+        .bars
+        .iter()
+        .map(bars)
+        .chain(of.figures.iter().map(figure))
+        .collect();
     View {
-        experiment: of.experiment.clone(),
-        title: of.title.clone(),
+        head: Head {
+            title: of.title.clone(),
+            class: "reproduction",
+            command: "reproduce",
+            names: vec![of.experiment.clone()],
+            sections: sections(&[
+                ("comparison", "Comparison", true),
+                ("figures", "Figures", !figures.is_empty()),
+                ("tables", "Tables", !of.tables.is_empty()),
+                ("setup", "Set-up", true),
+                ("remarks", "Remarks", !of.remarks.is_empty()),
+            ]),
+            version: of.version.clone(),
+        },
         paper: of.paper.clone(),
-        version: of.version.clone(),
         runs: match of.runs == of.paper_runs {
             true => format!("{} Monte Carlo runs, as in the paper", of.runs),
             false => format!(
@@ -140,7 +150,7 @@ pub(super) fn view(of: &Reproduction) -> View {
                 of.runs, of.paper_runs
             ),
         },
-        command: format!(
+        again: format!(
             "innovant reproduce {} --runs {} --seed {}",
             of.experiment, of.runs, of.seed
         ),
@@ -157,8 +167,7 @@ pub(super) fn view(of: &Reproduction) -> View {
                 agreement: c.agreement.words(),
             })
             .collect(),
-        figures: of.figures.iter().filter_map(group).collect(),
-        charts: of.bars.iter().map(chart).collect(),
+        figures,
         tables: of.tables.iter().map(table).collect(),
         paper_facts: facts(Origin::Paper),
         our_facts: facts(Origin::Ours),

@@ -1,14 +1,15 @@
 //! The pictures over frequency and over the variable of the learned law.
 
-use super::axis::Axis;
 use super::number::fixed;
-use super::plot::{Group, Plot, Series, Shade, interval};
+use super::plot::{Axis, Drawing, Group, Kind, Plot, Series, Shade, interval};
 use super::signals::answers_differ;
-use super::words::{capitalised, effect_name, listed};
+use super::words::{effect_name, listed};
 use crate::explain::{Curve, Explanation, SignalTraces, Verdict};
 
 /// Bands that carry their excess as a label: the strongest.
 const LABELLED: usize = 3;
+/// Frequencies that span more than this factor stand on a logarithmic axis.
+const WIDE: f64 = 20.0;
 
 /// Spectra of what is left, one for each output and recording that has one.
 pub(super) fn frequency_maps(of: &Explanation) -> Vec<Group> {
@@ -27,18 +28,23 @@ pub(super) fn frequency_maps(of: &Explanation) -> Vec<Group> {
 fn frequency_map(of: &Explanation, s: &SignalTraces, many: bool) -> Option<Group> {
     let lines: Vec<[f64; 3]> = s.spectrum.iter().copied().filter(|l| l[0] > 0.0).collect();
     let column = |k: usize| lines.iter().map(move |l| l[k]);
-    let x = Axis::over(column(0))?.logarithmic_if_wide();
+    let over = [
+        column(0).fold(f64::INFINITY, f64::min),
+        column(0).fold(0.0, f64::max),
+    ];
+    if over[0] > over[1] {
+        return None;
+    }
     let consistent = of.verdict == Verdict::Consistent;
     let before: Vec<f64> = column(1).collect();
     let after: Vec<f64> = column(2).collect();
     let two = !consistent && answers_differ(&before, &after);
     let shown = if two { 2 } else { 1 };
-    let y = Axis::over((1..=shown).flat_map(column))?.padded();
     let points = |k: usize| lines.iter().map(move |l| (l[0], l[k]));
     let name = if two { "before" } else { "residual" };
-    let mut series = vec![Series::line(name, "simulation", (&x, &y), points(1))];
+    let mut series = vec![Series::line(name, "simulation", points(1))];
     if two {
-        series.push(Series::line("after", "augmented", (&x, &y), points(2)));
+        series.push(Series::line("after", "augmented", points(2)));
     }
     let mut strongest: Vec<f64> = of.location.frequency.iter().map(|band| band[2]).collect();
     strongest.sort_by(|a, b| b.total_cmp(a));
@@ -57,13 +63,15 @@ fn frequency_map(of: &Explanation, s: &SignalTraces, many: bool) -> Option<Group
                 true => format!("+{size}"),
                 false => String::new(),
             };
-            Shade::new(&x, *from, *to, label, title)
+            Shade::new(over, [*from, *to], label, title)
         })
         .collect();
     let caption = match bands.is_empty() {
-        true => String::new(),
-        false => "Shaded: bands in which the difference stands out of the noise; the strongest carry their excess."
-            .to_owned(),
+        true if two => "The lower the second line lies, the more of the difference is explained.",
+        true => "A line without peaks is what noise leaves.",
+        false => {
+            "Shaded: bands in which the difference stands out of the noise; the strongest carry their excess."
+        }
     };
     let title = match many {
         true => format!("Over frequency: {}", s.output),
@@ -72,25 +80,24 @@ fn frequency_map(of: &Explanation, s: &SignalTraces, many: bool) -> Option<Group
     Some(Group {
         id: String::new(),
         title,
-        caption,
+        caption: String::new(),
         plots: vec![Plot {
             title: "Spectrum of the residual".to_owned(),
-            description: format!(
-                "Power of the residual of {} over frequency{}.",
-                s.output,
-                if two { ", before and after" } else { "" }
-            ),
-            x: x.horizontal("frequency", "Hz"),
-            y: y.vertical("power", "dB", 5.0),
-            series,
-            shades: bands,
-            strips: Vec::new(),
-            stripe: None,
+            caption: caption.to_owned(),
             height: "middle",
-            same_scale: false,
-            follows: false,
+            drawing: Drawing {
+                x: Axis::new("frequency", "Hz")
+                    .logarithmic(over[1] > WIDE * over[0])
+                    .spanning(over),
+                y: Axis::new("power", "dB").over((1..=shown).flat_map(column)),
+                series,
+                shades: bands,
+                ..Drawing::default()
+            },
         }],
         folded: false,
+        linked: false,
+        beside: false,
     })
 }
 
@@ -98,25 +105,27 @@ fn frequency_map(of: &Explanation, s: &SignalTraces, many: bool) -> Option<Group
 pub(super) fn learned_curve(of: &Explanation) -> Option<Group> {
     let curve = of.curve.as_ref()?;
     let points = points(curve);
-    let x = Axis::over(points.iter().map(|p| p.0))?.padded();
+    if points.is_empty() {
+        return None;
+    }
     let fitted = fitted(curve);
     let heights = points
         .iter()
         .flat_map(|p| [p.1 - 2.0 * p.2, p.1 + 2.0 * p.2]);
-    let y = Axis::over(heights.chain(fitted.iter().map(|p| p.1)))?.padded();
-    let around: Vec<_> = points.iter().map(|p| (p.0, p.1, 2.0 * p.2)).collect();
-    let mut series = vec![Series::dots_within(
-        "learned, ± 2 deviations",
-        "learned",
-        (&x, &y),
-        &around,
-    )];
+    let y = Axis::new(&curve.force, "").over(heights.chain(fitted.iter().map(|p| p.1)));
+    let dots = points.iter().map(|p| (p.0, p.1));
+    let around = points
+        .iter()
+        .map(|p| (p.0, p.1 - 2.0 * p.2, p.1 + 2.0 * p.2));
+    let mut series = vec![
+        Series::marks("learned", "learned", Kind::Dots, dots).within("± 2 deviations", around),
+    ];
     let title = match fitted.is_empty() {
         true => "Learned from the recording",
         false => "Learned, and the fitted law over it",
     };
     if !fitted.is_empty() {
-        series.push(Series::line("fitted law", "augmented", (&x, &y), fitted));
+        series.push(Series::line("fitted law", "augmented", fitted));
     }
     let like: Vec<String> = curve
         .resembles
@@ -131,25 +140,21 @@ pub(super) fn learned_curve(of: &Explanation) -> Option<Group> {
     Some(Group {
         id: "curve".to_owned(),
         title: "The missing law".to_owned(),
-        caption,
+        caption: String::new(),
         plots: vec![Plot {
             title: title.to_owned(),
-            description: format!(
-                "{} as a function of {}.",
-                capitalised(&curve.force),
-                curve.variable
-            ),
-            x: x.horizontal(&curve.variable, ""),
-            y: y.vertical(&curve.force, "", 5.0),
-            series,
-            shades: Vec::new(),
-            strips: Vec::new(),
-            stripe: None,
+            caption,
             height: "middle",
-            same_scale: false,
-            follows: false,
+            drawing: Drawing {
+                x: Axis::new(&curve.variable, "").over(points.iter().map(|p| p.0)),
+                y,
+                series,
+                ..Drawing::default()
+            },
         }],
         folded: false,
+        linked: false,
+        beside: false,
     })
 }
 

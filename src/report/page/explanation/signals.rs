@@ -1,7 +1,7 @@
 //! The pictures over time: recording against simulation against what was found, and what each leaves.
 
-use super::axis::Axis;
-use super::plot::{Group, Plot, Series, Shade, Stripe, interval};
+use super::plot::{Axis, Drawing, Group, Plot, Series, Shade, Stripe, interval};
+use super::words::listed;
 use crate::explain::{Explanation, SignalTraces, Verdict};
 
 /// Groups beyond this many are folded away.
@@ -88,48 +88,43 @@ fn group(of: &Explanation, s: &SignalTraces) -> Option<Group> {
     let samples = s.time.len().min(s.recorded.len());
     let (time, recorded) = (s.time.get(..samples)?, s.recorded.get(..samples)?);
     let answers = answers(of.verdict, s, samples);
+    let over = [*time.first()?, *time.last()?];
     let drawn = answers.iter().flat_map(|a| &a.values[..samples]);
-    let x = Axis::over(time.iter().copied())?;
-    let y = Axis::over(recorded.iter().chain(drawn).copied())?.padded();
     let draw = |values: &[f64]| -> Vec<(f64, f64)> {
         time.iter().copied().zip(values.iter().copied()).collect()
     };
-    let mut series = vec![Series::line(
-        "recorded",
-        "recorded",
-        (&x, &y),
-        draw(recorded),
-    )];
+    let mut series = vec![Series::line("recorded", "recorded", draw(recorded))];
     for a in &answers {
-        series.push(Series::line(a.name, a.class, (&x, &y), draw(a.values)));
+        series.push(Series::line(a.name, a.class, draw(a.values)));
     }
-    let windows = windows(of, &x);
-    let names: Vec<&str> = answers.iter().map(|a| a.name).collect();
-    let span = interval(*time.first()?, *time.last()?, "s");
+    let windows = windows(of, over);
+    let names: Vec<String> = answers.iter().map(|a| a.name.to_owned()).collect();
     let mut plots = vec![Plot {
         title: "Recording and models".to_owned(),
-        description: format!(
-            "{} over time, {span}: the recording and, over it, {}.",
+        caption: format!(
+            "{} over {}: where the thin line ({}) leaves the thick one, the recording, something is missing.",
             s.output,
-            names.join(", ")
+            interval(over[0], over[1], "s"),
+            listed(&names)
         ),
-        x: x.horizontal("time", "s"),
-        y: y.vertical(&s.output, &s.unit, 5.0),
-        series,
-        shades: windows.clone(),
-        strips: Vec::new(),
-        stripe: None,
         height: "tall",
-        same_scale: false,
-        follows: false,
+        drawing: Drawing {
+            x: Axis::new("time", "s").spanning(over),
+            y: Axis::new(&s.output, &s.unit).over(recorded.iter().chain(drawn).copied()),
+            series,
+            shades: windows.clone(),
+            ..Drawing::default()
+        },
     }];
-    plots.extend(residuals(of, s, recorded, time, &x, &answers, &windows));
+    plots.extend(residuals(of, s, recorded, time, &answers, &windows));
     Some(Group {
         id: String::new(),
         title: title(of, s),
         caption: caption(of, &plots),
         plots,
         folded: false,
+        linked: true,
+        beside: false,
     })
 }
 
@@ -143,7 +138,7 @@ fn title(of: &Explanation, s: &SignalTraces) -> String {
     }
 }
 
-fn windows(of: &Explanation, x: &Axis) -> Vec<Shade> {
+fn windows(of: &Explanation, over: [f64; 2]) -> Vec<Shade> {
     let strongest = of.location.time.iter().enumerate();
     strongest
         .filter_map(|(k, [from, to, _])| {
@@ -157,17 +152,17 @@ fn windows(of: &Explanation, x: &Axis) -> Vec<Shade> {
                 k + 1,
                 interval(*from, *to, "s")
             );
-            Shade::new(x, *from, *to, label, title)
+            Shade::new(over, [*from, *to], label, title)
         })
         .collect()
 }
 
-fn held_out(of: &Explanation, x: &Axis) -> Vec<Shade> {
+fn held_out(of: &Explanation, over: [f64; 2]) -> Vec<Shade> {
     let blocks = of.fit.heldout_blocks.iter();
     blocks
-        .filter_map(|[from, to]| {
-            let title = format!("never fitted: {}", interval(*from, *to, "s"));
-            Shade::new(x, *from, *to, String::new(), title)
+        .filter_map(|block| {
+            let title = format!("never fitted: {}", interval(block[0], block[1], "s"));
+            Shade::new(over, *block, String::new(), title)
         })
         .collect()
 }
@@ -177,49 +172,57 @@ fn residuals(
     s: &SignalTraces,
     recorded: &[f64],
     time: &[f64],
-    x: &Axis,
     answers: &[Answer],
     windows: &[Shade],
 ) -> Vec<Plot> {
+    let (Some(first), Some(end)) = (time.first(), time.last()) else {
+        return Vec::new();
+    };
+    let over = [*first, *end];
     let left: Vec<Vec<f64>> = answers
         .iter()
         .map(|a| recorded.iter().zip(a.values).map(|(y, m)| y - m).collect())
         .collect();
-    let Some(y) = Axis::over(left.iter().flatten().copied()).map(Axis::padded) else {
-        return Vec::new();
-    };
     let noise = (s.output == of.fit.output).then_some(of.fit.train.noise_floor.rmse);
     let last = answers.len() - 1;
     let mut plots: Vec<Plot> = Vec::new();
     for (k, (answer, values)) in answers.iter().zip(&left).enumerate() {
         let points = time.iter().copied().zip(values.iter().copied());
-        let series = Series::line(answer.name, answer.class, (x, &y), points);
+        let style = match answer.class {
+            "simulation" => "before",
+            "parameters" => "between",
+            _ => "after",
+        };
+        let series = Series::line(answer.name, style, points);
         match plots.first_mut() {
             // What other parameters alone leave stands beside what the simulation leaves.
-            Some(before) if k < last => before.series.push(series),
+            Some(before) if k < last => before.drawing.series.push(series),
             _ => plots.push(Plot {
                 title: match (k, last) {
-                    (0, 0) => "What the simulation leaves".to_owned(),
-                    (0, _) => "Residual before".to_owned(),
-                    _ if answer.class == "parameters" => {
-                        "Residual with other parameters".to_owned()
-                    }
-                    _ => "Residual after".to_owned(),
-                },
-                description: format!(
-                    "Recording minus {}, over time, on the scale of the residual before.",
-                    answer.name
-                ),
-                x: x.horizontal("time", "s"),
-                y: y.vertical("residual", &s.unit, 4.0),
-                series: vec![series],
-                shades: windows.to_vec(),
-                strips: held_out(of, x),
-                stripe: noise
-                    .and_then(|n| Stripe::around_zero(&y, 2.0 * n, "noise, ± 2 deviations")),
+                    (0, 0) => "What the simulation leaves",
+                    (0, _) => "Residual before",
+                    _ if answer.class == "parameters" => "Residual with other parameters",
+                    _ => "Residual after",
+                }
+                .to_owned(),
+                caption: match k {
+                    0 => "Recording minus model: what reaches beyond the grey band is more than noise.",
+                    _ => "The same with what was found, on the same scale: the less is left of the pattern above, the \
+                          more of it is explained.",
+                }
+                .to_owned(),
                 height: "low",
-                same_scale: true,
-                follows: k > 0,
+                drawing: Drawing {
+                    x: Axis::new("time", "s").spanning(over),
+                    y: Axis::new("residual", &s.unit).over(left.iter().flatten().copied()),
+                    series: vec![series],
+                    shades: windows.to_vec(),
+                    strips: held_out(of, over),
+                    stripe: noise
+                        .and_then(|n| Stripe::around_zero(2.0 * n, "noise, ± 2 deviations")),
+                    follows: k > 0,
+                    ..Drawing::default()
+                },
             }),
         }
     }
@@ -228,16 +231,16 @@ fn residuals(
 
 fn caption(of: &Explanation, plots: &[Plot]) -> String {
     let mut says = Vec::new();
-    let shaded = |p: &Plot| !p.shades.is_empty();
+    let shaded = |p: &Plot| !p.drawing.shades.is_empty();
     if plots.iter().any(shaded) {
         says.push("Shaded and numbered: the windows in which they differ most, strongest first.");
     } else if of.location.time.is_empty() && !of.location.outputs.is_empty() {
         says.push("They differ throughout, not in single windows.");
     }
-    if plots.iter().any(|p| p.stripe.is_some()) {
+    if plots.iter().any(|p| p.drawing.stripe.is_some()) {
         says.push("Grey band around zero: what noise alone does, two standard deviations.");
     }
-    if plots.iter().any(|p| !p.strips.is_empty()) {
+    if plots.iter().any(|p| !p.drawing.strips.is_empty()) {
         says.push("Bars along the upper edge: blocks that were never fitted.");
     }
     says.join(" ")
