@@ -28,7 +28,7 @@
   const labelled = (axis) => plain(axis.unit ? `${axis.label} [${axis.unit}]` : axis.label);
   const touch = matchMedia("(pointer: coarse)").matches;
   const CONFIG = {
-    displaylogo: false, responsive: false, scrollZoom: false, doubleClick: "reset", showTips: false,
+    displaylogo: false, responsive: false, displayModeBar: touch ? true : "hover", scrollZoom: false, doubleClick: "reset", showTips: false,
     modeBarButtons: [["zoomIn2d", "zoomOut2d", "resetScale2d"], ["toImage"]],
   };
 
@@ -108,7 +108,7 @@
         if (s.kind === "bars") {
           const labels = s.labels?.length ? { text: s.labels.map(plain), textposition: "outside", textangle: -90, cliponaxis: false,
             hovertemplate: `%{customdata}<extra>${plain(s.name)}</extra>`, customdata: text } : {};
-          return [{ ...trace, type: "bar", marker: { color: colour(name) }, ...labels }];
+          return [...bands, { ...trace, type: "bar", marker: { color: colour(name) }, ...labels }];
         }
         if (s.kind === "line") return [...bands, { ...trace, mode: "lines", line: { color: colour(name), width, dash, simplify: false } }];
         const symbol = s.kind === "crosses" ? "x-thin" : s.style === "zeros" ? "circle-open" : "circle";
@@ -126,7 +126,7 @@
       for (const s of spec.strips || []) found.push({ ...rect, x0: s.from, x1: s.to, y0: 1, y1: 1, yref: "paper", line: { width: 4, color: colour("ink", 0.55) }, type: "line", layer: "above" });
       if (spec.stripe) found.push({ type: "rect", xref: "paper", x0: 0, x1: 1, yref: "y", y0: -spec.stripe.half, y1: spec.stripe.half, fillcolor: colour("noise", 0.28), line: { width: 0 }, layer: "below" });
       if (spec.level !== undefined) found.push({ type: "line", xref: "paper", x0: 0, x1: 1, yref: "y", y0: spec.level, y1: spec.level, line: { color: colour("ink"), width: 1, dash: "4px,3px" } });
-      if (spec.unit_circle) found.push({ type: "circle", xref: "x", yref: "y", x0: -1, x1: 1, y0: -1, y1: 1, line: { color: colour("soft"), width: 1 }, layer: "below" });
+      if (spec.unit_circle) found.push({ type: "circle", xref: "x", yref: "y", x0: -1, x1: 1, y0: -1, y1: 1, line: { color: colour("soft"), width: 1 } });
       return found;
     }
 
@@ -136,15 +136,17 @@
       return {
         type: of.logarithmic ? "log" : "linear", gridcolor: colour("grid"), zerolinecolor: colour("hair"), linecolor: colour("soft"),
         tickfont: { size: 11.5, color: colour("soft") }, exponentformat: "power", minexponent: 4, hoverformat: ".5~g", automargin: true,
-        ...(of.logarithmic ? { dtick: this.decades(of) } : {}), ...(of.whole ? { tickformat: "d" } : {}),
+        ...(of.logarithmic ? this.decades(of) : {}), ...(of.whole ? { tickformat: "d" } : {}),
         ...(of.names ? { zeroline: false, showgrid: false } : {}), ...names,
         ...(range ? { range: [...range] } : of.range ? { range: of.range.map(log) } : {}),
       };
     }
-    // 1, 2, 5 within few decades, whole decades within many.
+    // Numbers where they are short, powers of ten elsewhere; 2 and 5 too within few decades.
     decades(of) {
-      const span = of.range ? Math.log10(of.range[1] / of.range[0]) : 3;
-      return span < 2.2 && this.box.clientWidth > 420 ? "D2" : span > 8 ? 2 : 1;
+      const [from, to] = (of.range || [0.1, 10]).map(Math.log10);
+      const short = from >= -4.2 && to < 5;
+      return { exponentformat: short ? "none" : "power", dtick: to - from < 1.3 ? "D2" : to - from > 8 ? 2 : 1,
+        minor: { dtick: "D1", showgrid: true, gridcolor: colour("grid"), griddash: "1px,3px" } };
     }
 
     layout() {
@@ -163,13 +165,13 @@
           ...(circle ? { constrain: "domain" } : {}) },
         yaxis: { ...this.axis(y, this.fit), fixedrange: this.linked, zeroline: !y.logarithmic, ...(circle ? { scaleanchor: "x", constrain: "domain" } : {}) },
         annotations: [{ text: labelled(y), showarrow: false, xref: "paper", yref: "paper", x: 0, y: 1, xanchor: "left", yanchor: "bottom", yshift: 4, font: { size: 12 } }],
-        shapes: this.shapes(), barmode: "group", bargap: 0.25,
+        shapes: this.shapes(), barmode: x.names ? "group" : "overlay", bargap: x.names ? 0.25 : 0.5,
       };
     }
 
     draw() {
       if (!this.box.clientWidth) return;
-      if (this.spec.least_width) this.box.style.minWidth = `${this.spec.least_width}px`;
+      if (this.spec.least_width && !root.classList.contains("on-paper")) this.box.style.minWidth = `${this.spec.least_width}px`;
       Plotly.react(this.box, this.traces(), this.layout(), CONFIG);
       if (this.drawn) return;
       this.drawn = true;
