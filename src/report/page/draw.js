@@ -78,7 +78,7 @@
       }));
       for (const [name, [s, alpha]] of bands) {
         const swatch = mark(s.style, "box");
-        swatch.style.opacity = alpha + 0.12;
+        swatch.style.opacity = alpha === 0.13 ? 0.18 : 0.42;
         key(name, swatch);
       }
       const box = (name, kind, text) => {
@@ -155,7 +155,7 @@
       const height = this.box.clientHeight, width = this.box.clientWidth;
       const named = x.names && width / x.names.length < 30 ? { tickangle: -60 } : {};
       return {
-        width, height, margin: { l: 44, r: 12, t: 26, b: 40 }, showlegend: false,
+        width, height, margin: { l: 44, r: 12, t: 26, b: 40 }, showlegend: false, separators: ".\u202f",
         paper_bgcolor: colour("paper"), plot_bgcolor: colour("paper"),
         font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: colour("ink") },
         hovermode: across ? "closest" : "x unified", hoverdistance: circle ? 25 : -1, dragmode: touch ? false : "zoom",

@@ -88,12 +88,17 @@ pub(super) fn map(of: &Invariants, model: &Model) -> Option<Group> {
             ..Drawing::default()
         },
     };
-    let whole = |[low, high]: [f64; 2]| [low.min(-1.05), high.max(1.05)];
+    let whole = |pick: fn(&Root) -> f64, [low, high]: [f64; 2]| {
+        let zeros = of.zeros.iter().filter(near).map(pick);
+        zeros.fold([low.min(-1.05), high.max(1.05)], |[low, high], z| {
+            [low.min(z), high.max(z)]
+        })
+    };
     let mut plots = vec![picture(
         "Poles and zeros",
         caption,
-        whole(across),
-        whole(up),
+        whole(|p| p.real, across),
+        whole(|p| p.imag, up),
     )];
     let span = (across[1] - across[0]).max(up[1] - up[0]);
     if span < 2.0 * CROWDED {

@@ -84,14 +84,24 @@ pub(super) fn view(
     };
     let remarks = summary.iter().flat_map(|s| s.warnings.clone());
     let remarks = remarks.chain(tests.iter().flat_map(|t| findings(t)));
+    // A sentence that begins with the name of a channel keeps it as it is.
+    let channels = || model.inputs.iter().chain(&model.outputs);
+    let begins_with_name = |text: &str| channels().any(|c| text.starts_with(&c.channel.name));
+    let as_sentence = |text: String| {
+        let text = match begins_with_name(&text) {
+            true => text,
+            false => capitalised(&text),
+        };
+        format!("{}.", text.trim_end_matches('.'))
+    };
     let style = Style::UNICODE;
-    let channels =
+    let channels_of =
         |of: &[IdentifiedChannel]| of.iter().map(|c| c.channel.clone()).collect::<Vec<_>>();
     let gains = gain_table(
         &described.static_gain,
         ROWS,
-        &channels(&model.inputs),
-        &channels(&model.outputs),
+        &channels_of(&model.inputs),
+        &channels_of(&model.outputs),
         style,
     );
     let tables = tests.map(test_tables);
@@ -120,7 +130,7 @@ pub(super) fn view(
         kind,
         headline: capitalised(headline),
         about,
-        remarks: remarks.map(|r| format!("{}.", capitalised(&r).trim_end_matches('.'))).collect(),
+        remarks: remarks.map(as_sentence).collect(),
         fit: tests.and_then(|t| Table::of(&fit_table(t), "")),
         no_free_run: tests.and_then(|t| t.free_run_unavailable.clone()),
         evidence,
@@ -129,7 +139,7 @@ pub(super) fn view(
             .map(Table::with_stars_marked),
         how: summary
             .map(|s| {
-                let how = s.explanation.iter().cloned().chain([method(s)]);
+                let how = s.explanation.iter().cloned().chain([format!("method: {}", method(s))]);
                 how.map(|h| format!("{}.", capitalised(&h).trim_end_matches('.'))).collect()
             })
             .unwrap_or_default(),
