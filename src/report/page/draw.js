@@ -6,7 +6,7 @@
 
   // Colour (a variable of style.css), width and dashes of a line.
   const STYLES = {
-    recorded: ["recorded", 3], simulation: ["simulation", 1.5, "7px,3px"], parameters: ["parameters", 1.5, "2px,3px"],
+    recorded: ["recorded", 4], simulation: ["simulation", 1.5, "7px,3px"], parameters: ["parameters", 1.5, "2px,3px"],
     augmented: ["found", 1.7], before: ["simulation", 1.1], between: ["parameters", 1.1, "2px,3px"], after: ["found", 1.1],
     learned: ["ink", 2], truth: ["simulation", 2], runs: ["floor", 0.7],
     first: ["found", 2], second: ["parameters", 2, "7px,3px"], third: ["good", 2, "2px,3px"], fourth: ["window", 2, "9px,3px,2px,3px"],

@@ -126,6 +126,13 @@ pub(in crate::report) fn with_unit(number: &str, unit: &str) -> String {
     }
 }
 
+/// Symbols that plain text has to do without.
+pub(in crate::report) fn typeset(text: &str) -> String {
+    text.replace("+-", "±")
+        .replace("sigma^2", "σ²")
+        .replace("sigma2", "σ²")
+}
+
 /// A number that is known exactly: no digits that say nothing.
 pub(in crate::report) fn exact(value: f64) -> String {
     let text = number(value, 6);

@@ -229,8 +229,8 @@ fn ends(values: impl IntoIterator<Item = f64>, logarithmic: bool, room: f64) -> 
     let size = low.abs().max(high.abs());
     let room = match high - low {
         // A single value still has an axis around it.
+        _ if size == 0.0 => 1.0,
         span if span <= 1e-9 * size => 0.05 * size,
-        span if span == 0.0 => 1.0,
         span => room * span,
     };
     let back = |v: f64| if logarithmic { 10f64.powf(v) } else { v };

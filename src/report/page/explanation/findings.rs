@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::number::{fixed, number, p_value, percent, uncertain, width, with_unit};
+use super::number::{fixed, number, p_value, percent, typeset, uncertain, width, with_unit};
 use super::plot::interval;
 use super::words::{capitalised, effect_name, listed, port};
 use crate::explain::{EffectFound, Evidence, Explanation, Verdict};
@@ -55,7 +55,7 @@ fn finding(of: &EffectFound) -> Finding {
         variant: of.variant.replace('_', " "),
         id: of.effect.clone(),
         place: place.trim_end_matches([',', ' ']).to_owned(),
-        sentence: of.sentence.clone(),
+        sentence: typeset(&of.sentence),
         equation: of.equation.clone(),
         parameters: of
             .parameters

@@ -1,7 +1,6 @@
 //! The pictures over time: recording against simulation against what was found, and what each leaves.
 
 use super::plot::{Axis, Drawing, Group, Plot, Series, Shade, Stripe, interval};
-use super::words::listed;
 use crate::explain::{Explanation, SignalTraces, Verdict};
 
 /// Groups beyond this many are folded away.
@@ -98,14 +97,12 @@ fn group(of: &Explanation, s: &SignalTraces) -> Option<Group> {
         series.push(Series::line(a.name, a.class, draw(a.values)));
     }
     let windows = windows(of, over);
-    let names: Vec<String> = answers.iter().map(|a| a.name.to_owned()).collect();
     let mut plots = vec![Plot {
         title: "Recording and models".to_owned(),
         caption: format!(
-            "{} over {}: where the thin line ({}) leaves the thick one, the recording, something is missing.",
+            "{} over {}: the recording is the thick line; where a thin one leaves it, that model lacks something.",
             s.output,
-            interval(over[0], over[1], "s"),
-            listed(&names)
+            interval(over[0], over[1], "s")
         ),
         height: "tall",
         drawing: Drawing {

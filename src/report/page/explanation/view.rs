@@ -6,7 +6,7 @@ use super::closing::{Left, Provenance, changes, detectable, left, noise, provena
 use super::findings::{Finding, Rival, Where, findings, location, rivals};
 use super::head::{Head, sections};
 use super::maps::{frequency_maps, learned_curve};
-use super::number::{probability, width};
+use super::number::{probability, typeset, width};
 use super::plot::Group;
 use super::proof::{Proof, proof};
 use super::signals::groups;
@@ -70,7 +70,7 @@ pub(super) fn view(of: &Explanation) -> View {
         kind: kind(of.verdict),
         probability: probability(of.probability),
         probability_width: width(of.probability),
-        summary: of.summary.clone(),
+        summary: of.summary.iter().map(|line| typeset(line)).collect(),
         signals,
         maps,
         findings,

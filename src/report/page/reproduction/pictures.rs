@@ -1,8 +1,7 @@
 //! Lines and bars of a reproduction.
 
-use super::number::number;
+use super::number::{number, typeset};
 use super::plot::{Axis, Drawing, Group, Kind, Plot, Series};
-use super::view::typeset;
 use crate::reproduce::{Bars, Curve, Figure, Panel, Role};
 
 /// Styles of bars that `draw.js` knows, in the order of the kinds.

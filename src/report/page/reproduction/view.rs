@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::head::{Column, Head, Row, Table, sections};
-use super::number::number;
+use super::number::{number, typeset};
 use super::pictures::{bars, figure};
 use super::plot::Group;
 use crate::reproduce::{self, Agreement, Comparison, Origin, Reproduction};
@@ -48,13 +48,6 @@ struct NumberTable {
     title: String,
     caption: String,
     table: Table,
-}
-
-/// Symbols that plain text has to do without.
-pub(super) fn typeset(text: &str) -> String {
-    text.replace("+-", "±")
-        .replace("sigma^2", "σ²")
-        .replace("sigma2", "σ²")
 }
 
 /// The class of an agreement in the style sheet.
