@@ -32,9 +32,11 @@ innovant identify "$folder/names.csv" --inputs 'u<script>alert(1)</script>,u<img
 
 for case in ${CASES:-001 004}; do
     at=data/concealed/case_$case
-    innovant explain "$at/recording.csv" --simulation "$at/simulation.csv" --report "$folder/explain-$case.html"
+    simulation=$at/simulation.csv
+    [ -f "$simulation" ] || simulation=$at/simulation.json
+    innovant explain "$at/recording.csv" --simulation "$simulation" --report "$folder/explain-$case.html"
 done
 
-innovant reproduce ${EXPERIMENTS:-van-wingerden-1 chiuso-picci-1} --runs "${RUNS:-4}" --output-dir "$folder"
+innovant reproduce ${EXPERIMENTS:-van-wingerden-1 chiuso-picci-1} --runs "${RUNS:-8}" --output-dir "$folder"
 
 python3 tests/pages/check.py "$folder"/*.html ${1:+--pictures "$folder/pictures"}

@@ -68,7 +68,7 @@
       const { series, stripe, strips } = this.spec;
       const named = series.filter((s) => s.name);
       const bands = new Map();
-      series.forEach((s) => s.bands?.forEach((band, k) => bands.has(band.name) || bands.set(band.name, [s, BANDS[s.bands.length - 1][k]])));
+      series.forEach((s) => s.bands?.forEach((band, k) => !band.name || bands.has(band.name) || bands.set(band.name, [s, BANDS[s.bands.length - 1][k]])));
       if (named.length + bands.size + (stripe ? 1 : 0) + (strips ? 1 : 0) < 2) return;
       series.forEach((s, k) => s.name && key(s.name, mark(s.style, s.kind), named.length < 2 ? null : () => {
         const on = this.hidden.has(k);

@@ -101,7 +101,8 @@ fn series(curve: &Curve, at: &[f64], lowest: f64) -> Series {
             let limits = at.iter().zip(lower.iter().zip(upper));
             let limits =
                 limits.filter_map(|(at, (low, high))| Some((*at, low.unwrap_or(lowest), (*high)?)));
-            series.within(format!("{}: band", curve.name), limits)
+            // The name of the line says what its band is.
+            series.within("", limits)
         }
     }
 }
@@ -113,8 +114,8 @@ pub(super) fn bars(of: &Bars) -> Group {
         .iter()
         .flat_map(|s| s.values.iter().flatten())
         .fold(of.reference, |m: f64, v| m.max(*v));
-    let (top, cut) = (longest.min(of.cut), longest > of.cut);
-    let room = if cut { ROOM_FOR_VALUES } else { 0.0 };
+    let top = longest.min(of.cut);
+    let room = if longest > top { ROOM_FOR_VALUES } else { 0.0 };
     let series = of.series.iter().enumerate().map(|(k, series)| {
         let values = || series.values.iter().copied().zip(&of.groups).enumerate();
         let bars =
@@ -133,20 +134,13 @@ pub(super) fn bars(of: &Bars) -> Group {
             .saying(says.collect())
             .labelled(labels.collect())
     });
-    let mut caption = of.caption.clone();
-    if cut {
-        caption = format!(
-            "{caption} Bars longer than {} are cut and carry their value.",
-            number(of.cut, 2)
-        );
-    }
     Group {
         id: of.id.clone(),
         title: of.title.clone(),
         caption: String::new(),
         plots: vec![Plot {
             title: of.quantity.clone(),
-            caption: caption.trim().to_owned(),
+            caption: of.caption.clone(),
             height: "middle",
             drawing: Drawing {
                 x: Axis::default().named(of.groups.iter().map(|g| typeset(g)).collect()),

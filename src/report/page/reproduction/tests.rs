@@ -72,7 +72,7 @@ fn small() -> Reproduction {
         bars: vec![Bars {
             id: text("bars-1"),
             title: text("Relative rms"),
-            caption: String::new(),
+            caption: text("What to see."),
             quantity: text("rms relative to tk-chol"),
             reference: 1.0,
             cut: 3.0,
