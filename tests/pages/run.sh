@@ -25,7 +25,7 @@ innovant identify data/closed_loop.csv --report "$folder/identify.html"
 innovant identify data/servo.csv --inputs voltage --outputs speed --report "$folder/identify-servo.html"
 innovant identify data/closed_loop.csv --order 1 --report "$folder/identify-rejected.html"
 # Names that would do harm if they were not escaped.
-sed '1s/.*/t,"u<script>alert(1)<\/script>","u<img src=x onerror=alert(2)>","y<a href=""javascript:alert(3)"">z<\/a>","y&amp;<b>"/' \
+sed '1s/.*/t,"u<script>alert(1)<\/script>","u<img src=x onerror=alert(2)>","y<a href=""javascript:alert(3)"">z<\/a>","y\&amp;<b>"/' \
     data/closed_loop.csv > "$folder/names.csv"
 innovant identify "$folder/names.csv" --inputs 'u<script>alert(1)</script>,u<img src=x onerror=alert(2)>' \
     --outputs 'y<a href="javascript:alert(3)">z</a>,y&amp;<b>' --report "$folder/identify-names.html"
