@@ -62,6 +62,7 @@
         swatch.className = `swatch ${kind}`;
         swatch.style.setProperty("--c", `var(--${name})`);
         swatch.style.setProperty("--w", `${Math.max(1.5, width)}px`);
+        if (style === "zeros") swatch.classList.add("open");
         if (dash && kind === "line") swatch.classList.add("dashed");
         return swatch;
       };

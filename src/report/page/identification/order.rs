@@ -70,7 +70,9 @@ fn criteria(of: &Summary) -> Option<Plot> {
     let chosen = of.order as f64;
     let says = match best == chosen {
         true => format!("Smallest at the order that was chosen, {chosen}."),
-        false => format!("Smallest at {best}; order {chosen} was chosen for the reasons below."),
+        false => {
+            format!("Smallest at {best}; order {chosen} was chosen for the reasons given above.")
+        }
     };
     let at = points.iter().copied().filter(|p| p.0 == chosen);
     Some(Plot {
