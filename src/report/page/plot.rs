@@ -153,13 +153,14 @@ fn is_false(value: &bool) -> bool {
     !value
 }
 
-/// JSON that can stand within a script element: nothing in it ends the element or starts a comment.
+/// JSON that can stand within a script element: nothing in it means anything to HTML.
 fn as_script<S: Serializer>(drawing: &Drawing, to: S) -> Result<S::Ok, S::Error> {
     let json = serde_json::to_string(drawing).map_err(serde::ser::Error::custom)?;
     let json = json
         .replace('<', "\\u003c")
         .replace('>', "\\u003e")
-        .replace('&', "\\u0026");
+        .replace('&', "\\u0026")
+        .replace('\'', "\\u0027");
     to.serialize_str(&json)
 }
 
