@@ -84,6 +84,57 @@ fn output_to_stdout_has_no_table() {
 }
 
 #[test]
+fn a_report_is_a_page_and_changes_nothing_else() {
+    let folder = Folder::new();
+    let path = folder.recording("log.csv", &systems::servo(), 2000, 5);
+    let text = fs::read_to_string(path).unwrap();
+    let evil = text.replacen("u1", "u<script>alert(1)</script>", 1);
+    folder.text("evil.csv", &evil);
+    let plain = folder
+        .run(&["identify", "log.csv", "-o", "plain.json"])
+        .ok();
+    let table = folder
+        .run(&[
+            "identify",
+            "log.csv",
+            "-o",
+            "model.json",
+            "--report",
+            "page.html",
+        ])
+        .ok();
+    assert_eq!(
+        json(&folder.join("plain.json")),
+        json(&folder.join("model.json"))
+    );
+    assert_eq!(
+        table.replace("model.json\nwritten to page.html", "plain.json"),
+        plain
+    );
+    let page = fs::read_to_string(folder.join("page.html")).unwrap();
+    assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>"));
+    assert!(page.contains("Nothing left to explain") && page.contains("Residuals and their past"));
+
+    let page = folder.run(&["identify", "evil.csv", "--report", "-"]).ok();
+    assert!(page.contains("u&lt;script&gt;alert(1)") && !page.contains("<script>alert"));
+    // What is read cannot be read twice.
+    let run = folder.run_with_input(&["identify", "-", "--report", "stdin.html"], text.into());
+    assert_eq!(run.code, 0);
+    let page = fs::read_to_string(folder.join("stdin.html")).unwrap();
+    assert!(page.contains("What excites the plant"));
+
+    let error = folder
+        .run(&["identify", "log.csv", "-o", "one", "--report", "one"])
+        .error();
+    assert!(error.contains("name the same file"), "{error}");
+    let error = folder
+        .run(&["identify", "log.csv", "--report", "nowhere/page.html"])
+        .error();
+    assert!(error.contains("nowhere/page.html"), "{error}");
+    assert!(!folder.files().iter().any(|name| name == "one"));
+}
+
+#[test]
 fn standard_input_gzip_and_files_agree() {
     let folder = Folder::new();
     let path = folder.recording("log.csv", &systems::servo(), 2000, 5);

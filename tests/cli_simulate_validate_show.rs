@@ -252,6 +252,7 @@ fn show_has_the_keys_of_the_design() {
         "magnitude_99",
         "phase_rad",
         "phase_95",
+        "phase_99",
     ] {
         assert!(!point[key].is_null(), "{key}");
     }

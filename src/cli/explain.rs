@@ -64,16 +64,8 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     sources.extend(flags.simulation.iter().cloned().map(Source::from));
     check_distinct(&sources)?;
     let read = paths(&sources);
-    let place = |path: &Option<PathBuf>| path.as_ref().map(|p| Output::check(p, &read)).transpose();
-    let (output, report) = (place(&flags.output)?, place(&flags.report)?);
-    if let (Some(a), Some(b)) = (&flags.output, &flags.report)
-        && a == b
-    {
-        anyhow::bail!(
-            "{}: --output and --report name the same file; give two",
-            a.display()
-        );
-    }
+    let (output, report) =
+        Output::check_both(flags.output.as_deref(), flags.report.as_deref(), &read)?;
     let roles = flags.roles.roles();
     let mut logs: Vec<Log> = Vec::with_capacity(flags.logs.len());
     for source in &flags.logs {

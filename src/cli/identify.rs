@@ -11,15 +11,16 @@ use super::progress::Progress;
 use super::roles::RoleFlags;
 use super::terminal::style;
 use super::{Outcome, Verbosity};
-use crate::identify::{FileRecords, IdentifyError, Model, Options, Order};
+use crate::identify::{FileRecords, IdentifyError, Model, Options, Order, Records};
 use crate::log::{Roles, Source};
 use crate::report::text::{ModelText, findings, model_text, verdict, wrapped};
-use crate::report::{ModelDocument, Request};
+use crate::report::{ModelDocument, Request, Watched, identification_page};
 use crate::validate::{TestedModel, Validation, identify_and_test};
 
 const EXAMPLE: &str = "Examples:
   innovant identify log.csv                        columns u* are inputs, y* outputs, t is time
   innovant identify log.csv.gz --inputs voltage --outputs speed,current --output model.json
+  innovant identify log.csv --report page.html     pictures, in one file that opens offline
   innovant identify first.csv second.csv           two experiments of one plant
   innovant identify log.csv --order 2..8           compare orders
   ssh plant cat log.csv | innovant identify - --dt 0.01 --output - | jq .warnings";
@@ -44,6 +45,10 @@ pub(super) struct Flags {
     /// Write the model to this file, as JSON; `-` is standard output (then without the table)
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Write a page to this file, as HTML: verdict, order, frequency response, poles, step response, residuals and the
+    /// recording, with pictures; `-` is standard output
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
 }
 
 /// What is to be done, checked.
@@ -53,15 +58,15 @@ struct Plan {
     options: Options,
     request: Request,
     output: Option<Output>,
+    report: Option<Output>,
 }
 
 impl Plan {
     fn new(flags: Flags) -> anyhow::Result<Self> {
         check_distinct(&flags.logs)?;
-        let output = flags
-            .output
-            .map(|path| Output::check(&path, &paths(&flags.logs)))
-            .transpose()?;
+        let read = paths(&flags.logs);
+        let (output, report) =
+            Output::check_both(flags.output.as_deref(), flags.report.as_deref(), &read)?;
         if let Some(threads) = flags.threads {
             rayon::ThreadPoolBuilder::new()
                 .num_threads(threads.into())
@@ -74,6 +79,7 @@ impl Plan {
             roles,
             options,
             output,
+            report,
         })
     }
 }
@@ -85,8 +91,13 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     let started = Instant::now();
     let mut records =
         FileRecords::open(plan.sources, plan.roles)?.with_progress(progress.callback());
-    let TestedModel { model, tests } =
-        identify_and_test(&mut records, &plan.options).map_err(|error| with_names(error, &logs))?;
+    // Pictures of the recording are gathered in passing, and only for a page.
+    let mut watched = match &plan.report {
+        Some(_) => Reading::Watched(Watched::new(&mut records)),
+        None => Reading::Plain(&mut records),
+    };
+    let TestedModel { model, tests } = identify_and_test(watched.records(), &plan.options)
+        .map_err(|error| with_names(error, &logs))?;
     progress.finish();
     if say.verbose {
         for recording in &model.recordings {
@@ -120,20 +131,44 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
             .with_residual_tests(tests.clone())
             .with_request(plan.request);
         output.write(&document.to_json()?)?;
-        if output.is_stdout() {
-            if !say.quiet {
-                tell(&model, tests.as_ref());
-            }
-            return Ok(Outcome::Done);
-        }
     }
-    if !say.quiet {
-        print(&table(&model, tests.as_ref()))?;
-        if let Some(output) = &plan.output {
-            print(&format!("\nwritten to {}\n", output.path().display()))?;
-        }
+    if let (Some(report), Reading::Watched(watched)) = (&plan.report, &watched) {
+        let overview = watched.overview();
+        report.write(&identification_page(
+            &model,
+            tests.as_ref(),
+            Some(&overview),
+        )?)?;
+    }
+    if say.quiet {
+        return Ok(Outcome::Done);
+    }
+    let files = || [&plan.output, &plan.report].into_iter().flatten();
+    if files().any(Output::is_stdout) {
+        tell(&model, tests.as_ref());
+        return Ok(Outcome::Done);
+    }
+    print(&table(&model, tests.as_ref()))?;
+    for (index, output) in files().enumerate() {
+        let gap = if index == 0 { "\n" } else { "" };
+        print(&format!("{gap}written to {}\n", output.path().display()))?;
     }
     Ok(Outcome::Done)
+}
+
+/// Recordings, watched for a page or not.
+enum Reading<'a> {
+    Plain(&'a mut dyn Records),
+    Watched(Watched<'a>),
+}
+
+impl Reading<'_> {
+    fn records(&mut self) -> &mut dyn Records {
+        match self {
+            Self::Plain(records) => *records,
+            Self::Watched(watched) => watched,
+        }
+    }
 }
 
 /// What a person should know when the table goes nowhere.

@@ -59,6 +59,27 @@ impl Output {
         Ok(output)
     }
 
+    /// Checks the two files that a command can write, the document and the page.
+    ///
+    /// # Errors
+    /// Those of [`Output::check`], or both are the same file.
+    pub(super) fn check_both(
+        document: Option<&Path>,
+        page: Option<&Path>,
+        read: &[&Path],
+    ) -> anyhow::Result<(Option<Self>, Option<Self>)> {
+        if let (Some(document), Some(page)) = (document, page)
+            && document == page
+        {
+            anyhow::bail!(
+                "{}: --output and --report name the same file; give two",
+                document.display()
+            );
+        }
+        let place = |path: Option<&Path>| path.map(|path| Self::check(path, read)).transpose();
+        Ok((place(document)?, place(page)?))
+    }
+
     fn try_place(&self, target: &Path) -> io::Result<()> {
         match fs::metadata(target) {
             Ok(about) if about.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),

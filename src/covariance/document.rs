@@ -81,6 +81,9 @@ pub struct ResponsePoint {
     pub phase_rad: Option<f64>,
     /// 95% band of the phase; may pass `+-pi`, and is the full circle where the phase is not determined.
     pub phase_95: Option<[f64; 2]>,
+    /// 99% band of the phase, likewise; absent in documents of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub phase_99: Option<[f64; 2]>,
     /// How the bands were found.
     pub method: Option<BandMethod>,
 }

@@ -160,6 +160,7 @@ fn points(
                     magnitude_99: band.and_then(|b| finite_pair(b.magnitude_99)),
                     phase_rad: finite(g.arg()),
                     phase_95: band.and_then(|b| finite_pair(b.phase_95)),
+                    phase_99: band.and_then(|b| finite_pair(b.phase_99)),
                     method: band.map(|b| b.method),
                 });
             }
@@ -318,6 +319,7 @@ mod tests {
             "magnitude_99",
             "phase_rad",
             "phase_95",
+            "phase_99",
         ] {
             assert!(!json["frequency_response"][0][key].is_null(), "{key}");
         }

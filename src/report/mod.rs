@@ -8,27 +8,27 @@
 //! | `json`           | how JSON is laid out; `location`: where in it something stands    |
 //! | `schema`         | the JSON Schema                                                   |
 //! | `text`           | tables for a terminal                                             |
-//! | `page`, `reproduction` | pages of explanations and reproductions                     |
-//! | `drawing`        | what pages are drawn with                                         |
+//! | `page`           | pages of identifications, explanations and reproductions          |
+//! | `overview`       | envelopes and spectra of a recording, gathered while it is read   |
+//! | `reproduction_csv` | all numbers of a reproduction as one long table                 |
 
 mod channels;
-mod drawing;
 mod error;
 mod json;
 mod location;
 mod matrix;
 mod model_document;
+mod overview;
 mod packed;
 mod page;
 mod read;
 mod read_explanation;
-mod reproduction;
+mod reproduction_csv;
 mod request;
 mod schema;
 pub mod text;
 
 pub use channels::{InputDocument, OutputDocument};
-pub use drawing::PageError;
 pub use error::DocumentError;
 pub use json::to_json;
 pub use matrix::Rows;
@@ -36,10 +36,14 @@ pub(crate) use model_document::names;
 pub use model_document::{
     DiagnosticsDocument, InvariantsDocument, MODEL_FORMAT, ModelDocument, Provenance,
 };
+pub use overview::{Excitation, Experiment, Overview, Watched};
 pub use packed::CovarianceDocument;
-pub use page::explanation_page;
+pub use page::PageError;
+pub use page::explanation::explanation_page;
+pub use page::identification::identification_page;
+pub use page::reproduction::reproduction_page;
 pub use read::{ReadModel, parse_model, read_model};
 pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
-pub use reproduction::{reproduction_csv, reproduction_page};
+pub use reproduction_csv::reproduction_csv;
 pub use request::Request;
 pub use schema::{explanation_schema, model_schema, reproduction_schema};

@@ -1,54 +1,72 @@
-//! The page of an explanation: one HTML file that needs nothing else, neither a network nor other files.
+//! The pages: one look for explanations, identifications and reproductions. A page is one HTML file that opens
+//! offline: it needs neither a network nor other files.
 //!
 //! | file             | one idea                                                              |
 //! |------------------|-----------------------------------------------------------------------|
-//! | `view`           | everything the template is given                                      |
-//! | `signals`, `maps`| the pictures over time; over frequency and over the learned law       |
-//! | `proof`          | fit step by step, with the bootstrap interval                         |
-//! | `findings`       | effects, places, rivals                                               |
-//! | `closing`        | what is left, noise, provenance                                       |
-//! | `words`          | how effects are called                                                |
-//! | `page.html`, `sections.html` | the templates                                             |
+//! | `explanation`, `identification`, `reproduction` | what each page shows                   |
+//! | `plot`           | a picture as data: axes, series, shaded windows                       |
+//! | `thin`           | long lines thinned, digits that a screen can show                     |
+//! | `number`         | how numbers are written                                               |
+//! | `base.html`, `plots.html`, `style.css` | frame, pictures and looks of every page         |
+//! | `draw.js`        | draws the pictures                                                    |
+//! | `library`        | plotly.js, which does the drawing                                     |
 //!
-//! Pictures, numbers, looks and interaction come from `drawing`, which all pages share.
+//! Whatever comes from files (names, units, sentences) is escaped: by the templates in HTML, by `plot` in the data of
+//! pictures, and by `draw.js` where plotly.js reads tags in texts. The content security policy of the page allows
+//! nothing to be loaded.
 
-mod closing;
-mod findings;
-mod maps;
-mod proof;
-mod signals;
-mod view;
-mod words;
+mod error;
+pub(in crate::report) mod explanation;
+mod head;
+pub(in crate::report) mod identification;
+mod library;
+mod number;
+mod plot;
+pub(in crate::report) mod reproduction;
+mod thin;
 
-#[cfg(test)]
-pub(crate) mod fixtures;
 #[cfg(test)]
 mod tests;
 
-use minijinja::context;
+use minijinja::syntax::SyntaxConfig;
 use minijinja::value::{Serde, Value};
+use minijinja::{AutoEscape, Environment, UndefinedBehavior, context};
+use serde::Serialize;
 
-use super::drawing::{self, PageError, SCRIPT, STYLE, axis, number, plot};
-use crate::explain::Explanation;
+pub use error::PageError;
 
-const PAGE: &str = include_str!("page.html");
-const SECTIONS: &str = include_str!("sections.html");
+const BASE: &str = include_str!("base.html");
+const PLOTS: &str = include_str!("plots.html");
+const STYLE: &str = include_str!("style.css");
+const SCRIPT: &str = include_str!("draw.js");
 
-/// The explanation as a page to open in a browser.
-///
-/// Whatever comes from files (names, units, sentences) is escaped.
+/// Fills templates (name and text); the last of them is the page.
 ///
 /// # Errors
-///
-/// When the template cannot be filled, which no explanation should bring about.
-pub fn explanation_page(explanation: &Explanation) -> Result<String, PageError> {
-    let mut templates = drawing::templates()?;
-    templates.add_template("sections", SECTIONS)?;
-    templates.add_template("page", PAGE)?;
-    let page = templates.get_template("page")?;
-    Ok(page.render(context! {
-        page => Value::from(Serde(view::view(explanation))),
+/// When the templates and `page` do not fit together.
+fn render<T: Serialize>(
+    own: &[(&'static str, &'static str)],
+    page: &T,
+) -> Result<String, PageError> {
+    let mut templates = Environment::new();
+    templates.set_auto_escape_callback(|_| AutoEscape::Html);
+    templates.set_undefined_behavior(UndefinedBehavior::Strict);
+    templates.set_syntax(
+        SyntaxConfig::builder()
+            .trim_blocks(true)
+            .lstrip_blocks(true)
+            .build()?,
+    );
+    let shared = [("base", BASE), ("plots", PLOTS)];
+    let mut name = "base";
+    for (this, text) in shared.into_iter().chain(own.iter().copied()) {
+        templates.add_template(this, text)?;
+        name = this;
+    }
+    Ok(templates.get_template(name)?.render(context! {
+        page => Value::from(Serde(page)),
         style => STYLE,
         script => SCRIPT,
+        library => library::plotly(),
     })?)
 }

@@ -1,244 +1,77 @@
-//! The page as a whole.
+//! What holds for every page.
 
-use super::explanation_page;
-use super::fixtures::{all, consistent, family, load_step, named, parameters, unexplained};
-use crate::explain::{Explanation, FitTable, Location, Verdict};
+use super::library::plotly;
 
-fn page(of: &Explanation) -> String {
-    explanation_page(of).unwrap()
+/// The page without the library that draws.
+pub(super) fn own(page: &str) -> String {
+    assert_eq!(page.matches(plotly()).count(), 1);
+    page.replace(plotly(), "")
 }
 
-/// Sections by the id of their heading.
-fn has(page: &str, id: &str) -> bool {
-    page.contains(&format!("<section id=\"{id}\""))
-}
-
-#[test]
-fn nothing_is_loaded_from_elsewhere() {
-    for (name, e) in all() {
-        let page = page(&e);
-        for word in [
-            "http:", "https:", "//www", " src=", "@import", "url(", "<link", "fetch(",
-        ] {
-            assert!(!page.contains(word), "{name}: {word}");
-        }
-        assert!(page.contains("default-src 'none'"));
-        assert!(page.len() < 700_000, "{name}: {} bytes", page.len());
-    }
-}
-
-#[test]
-fn what_comes_from_files_is_escaped() {
-    let evil = "<script>alert(1)</script> & \"x\" 'y' onload=\"z\"";
-    let mut e = unexplained();
-    e.effects = named().effects;
-    e.detectable = consistent().detectable;
-    e.location = load_step().location;
-    e.location.regime = named().location.regime;
-    let text = serde_json::to_string(&e).unwrap();
-    let mut value: serde_json::Value = serde_json::from_str(&text).unwrap();
-    poison(&mut value, evil);
-    for verdict in ["named", "family", "unexplained", "consistent", "parameters"] {
-        value["verdict"] = verdict.into();
-        let e: Explanation = serde_json::from_value(value.clone()).unwrap();
-        let page = page(&e);
-        assert!(!page.contains("<script>alert"));
-        assert!(!page.contains("\"x\""));
-        assert!(!page.contains("'y'"));
-        assert!(page.contains("&lt;script&gt;alert"));
-        assert_eq!(page.matches("<script>").count(), 1);
-        assert_eq!(page.matches("</script>").count(), 1);
-    }
-}
-
-/// Replaces every text.
-fn poison(value: &mut serde_json::Value, by: &str) {
-    match value {
-        serde_json::Value::String(text) => *text = by.to_owned(),
-        serde_json::Value::Array(items) => items.iter_mut().for_each(|v| poison(v, by)),
-        serde_json::Value::Object(map) => {
-            if let Some(parameters) = map.get_mut("parameters").and_then(|p| p.as_object_mut())
-                && let Some(fc) = parameters.remove("Fc")
-            {
-                parameters.insert(by.to_owned(), fc);
-            }
-            for (key, v) in map.iter_mut() {
-                if key != "looks_at" {
-                    poison(v, by);
-                }
-            }
-        }
-        _ => {}
-    }
-}
-
-#[test]
-fn sections_without_content_are_left_out() {
-    let consistent = page(&consistent());
-    for id in ["found", "where", "rivals", "parameters", "experiment"] {
-        assert!(!has(&consistent, id), "{id}");
-        assert!(!consistent.contains(&format!("href=\"#{id}\"")), "{id}");
-    }
-    for id in ["answer", "pictures", "proof", "left", "provenance"] {
-        assert!(has(&consistent, id), "{id}");
-    }
-    assert!(consistent.contains("smallest effects"));
-    assert!(!consistent.contains("Residual after"));
-    assert!(!consistent.contains("id=\"curve\""));
-
-    let named = page(&named());
-    for id in [
-        "answer",
-        "pictures",
-        "found",
-        "where",
-        "proof",
-        "rivals",
-        "parameters",
-        "left",
-        "provenance",
+/// Nothing of the page comes from elsewhere, and it is no larger than a page may be.
+pub(super) fn opens_offline(name: &str, page: &str) {
+    assert!(page.len() < 6_000_000, "{name}: {} bytes", page.len());
+    let vocabularies = page.matches("http://www.w3.org/").count();
+    assert_eq!(page.matches("http://").count(), vocabularies, "{name}");
+    assert!(!page.contains("https://"), "{name}");
+    let own = own(page);
+    for word in [
+        "http:", "//www", " src=", "@import", "url(", "<link", "fetch(",
     ] {
-        assert!(has(&named, id), "{id}");
+        assert!(!own.contains(word), "{name}: {word}");
     }
-    assert!(named.contains("Residual before") && named.contains("Residual after"));
-    assert!(named.contains("id=\"curve\""));
-    assert!(!named.contains("class=\"shade\"") || named.contains("dB"));
-    assert!(!has(&named, "experiment"));
-    assert!(has(&page(&family()), "experiment"));
+    assert!(own.contains("default-src 'none'"));
 }
 
-#[test]
-fn every_verdict_has_its_sentence() {
-    let says = |e: &Explanation, text: &str| assert!(page(e).contains(text), "{text}");
-    says(
-        &named(),
-        "The simulation leaves out Coulomb friction at position.",
+/// Scripts, tables and pictures are what the frame and the data of the pictures have, and say what they are.
+pub(super) fn is_sound(name: &str, page: &str) {
+    let own = own(page);
+    let count = |what: &str| own.matches(what).count();
+    assert_eq!(
+        (count("<script>"), count("<h1"), count("<main")),
+        (2, 1, 1),
+        "{name}"
     );
-    says(
-        &load_step(),
-        "The simulation leaves out a load step at position.",
+    assert_eq!(
+        count("<script"),
+        2 + count("<script type=\"application/json\">"),
+        "{name}"
     );
-    says(
-        &family(),
-        "Coulomb friction at position or, about as likely, Stribeck friction.",
+    assert_eq!(count("<script"), count("</script>"), "{name}");
+    let pictures = count("class=\"drawing\"");
+    assert_eq!(
+        pictures,
+        count("<script type=\"application/json\">"),
+        "{name}"
     );
-    says(&consistent(), "The simulation agrees with the recording");
-    says(&parameters(), "its parameters are not.");
-    says(&unexplained(), "that no known effect explains.");
-    assert!(!page(&unexplained()).contains("why they lost"));
-}
-
-#[test]
-fn windows_are_shaded_and_numbered() {
-    let page = page(&load_step());
-    assert!(page.contains("differs most, window 1: 17.4 – 25.0\u{a0}s"));
-    assert!(page.contains("class=\"shade\""));
-    assert!(page.contains("class=\"mark\""));
-}
-
-#[test]
-fn an_empty_explanation_is_a_page_too() {
-    for verdict in [
-        Verdict::Consistent,
-        Verdict::Parameters,
-        Verdict::Named,
-        Verdict::Family,
-        Verdict::Unexplained,
-    ] {
-        let mut e = consistent();
-        e.verdict = verdict;
-        e.summary.clear();
-        e.signals.clear();
-        e.noise.clear();
-        e.detectable.clear();
-        e.recordings.clear();
-        e.location = Location::default();
-        e.fit = FitTable {
-            heldout: None,
-            heldout_blocks: Vec::new(),
-            ..e.fit
-        };
-        let page = page(&e);
-        assert!(!has(&page, "pictures"));
-        assert!(!page.contains("Held-out blocks"));
-        assert!(page.contains("</html>"));
-    }
-}
-
-#[test]
-fn odd_numbers_and_lengths_do_no_harm() {
-    let mut e = named();
-    let s = &mut e.signals[0];
-    s.recorded[3] = f64::NAN;
-    s.simulated[4] = f64::INFINITY;
-    s.augmented.truncate(10);
-    s.parameters_only.clear();
-    s.spectrum[0] = [0.0, f64::NEG_INFINITY, f64::NAN];
-    e.probability = f64::NAN;
-    e.fit.train.improvement_95 = Some([f64::NAN, 1.0]);
-    e.location.time = vec![[f64::NAN, 1.0, 0.0], [5.0, 4.0, 1.0], [-1e300, 1e300, 1.0]];
-    if let Some(curve) = &mut e.curve {
-        curve.std.truncate(2);
-        curve.value[5] = f64::NAN;
-    }
-    let page = page(&e);
-    assert!(!page.contains("NaN") && !page.contains("inf\""));
-    e.signals[0].time.clear();
-    e.signals[0].spectrum.clear();
-    assert!(explanation_page(&e).is_ok());
-}
-
-#[test]
-fn tables_and_pictures_say_what_they_are() {
-    for (name, e) in all() {
-        let page = page(&e);
-        assert_eq!(page.matches("<h1").count(), 1, "{name}");
-        assert_eq!(page.matches("<main").count(), 1, "{name}");
-        assert_eq!(
-            page.matches("<table").count(),
-            page.matches("<caption").count(),
-            "{name}"
+    assert_eq!(pictures, count("role=\"img\""), "{name}");
+    // Every picture has a heading and a sentence.
+    assert_eq!(count("<h4>"), pictures, "{name}");
+    assert_eq!(count("<h4></h4>"), 0, "{name}");
+    for part in own.split("class=\"drawing\"").skip(1) {
+        let rest = part
+            .split_once("<script type=\"application/json\">")
+            .unwrap();
+        let (caption, data) = (rest.0, rest.1.split("</script>").next().unwrap());
+        assert!(
+            caption.contains("<p class=\"caption\">"),
+            "{name}: {caption}"
         );
-        assert_eq!(
-            page.matches("role=\"img\"").count(),
-            page.matches("data-plot").count() - 1,
-            "{name}"
-        );
-        let mut ids: Vec<&str> = page
-            .split(" id=\"")
-            .skip(1)
-            .filter_map(|s| s.split('"').next())
-            .collect();
-        let all = ids.len();
-        ids.sort_unstable();
-        ids.dedup();
-        assert_eq!(ids.len(), all, "{name}: ids are unique");
+        let drawing: serde_json::Value = serde_json::from_str(data).unwrap();
+        assert!(drawing["x"]["label"].is_string() && drawing["y"]["unit"].is_string());
+        assert!(!drawing["series"].as_array().unwrap().is_empty(), "{name}");
     }
-}
-
-#[test]
-fn what_says_nothing_is_left_out() {
-    // Found by an exact test: no criterion; and no step from parameters to effect, no interval of one.
-    let mut e = named();
-    e.effects[0].evidence.criterion_gain = 0.0;
-    e.effects[0].evidence.criterion_needed = 0.0;
-    e.fit.train.augmented = e.fit.train.parameters_only;
-    e.fit.heldout = None;
-    let page = page(&e);
-    assert!(!page.contains("What speaks for it"));
-    assert!(page.contains("by a test of its own"));
-    assert!(!page.contains("paired block bootstrap"));
-}
-
-#[test]
-fn only_the_strongest_bands_carry_a_label() {
-    let mut e = named();
-    e.location.time.clear();
-    let start = |k: u32| 0.1 * f64::from(k + 1);
-    e.location.frequency = (0..8)
-        .map(|k| [start(k), start(k) + 0.05, f64::from(k)])
+    let mut ids: Vec<&str> = own
+        .split(" id=\"")
+        .skip(1)
+        .filter_map(|s| s.split('"').next())
         .collect();
-    let page = page(&e);
-    assert_eq!(page.matches("class=\"shade\"").count(), 8);
-    assert_eq!(page.matches("class=\"mark\"").count(), 3);
+    let all = ids.len();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), all, "{name}: ids are unique");
+    for target in own.split("href=\"#").skip(1) {
+        let id = target.split('"').next().unwrap();
+        assert!(ids.contains(&id), "{name}: {id}");
+    }
 }

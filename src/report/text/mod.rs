@@ -13,11 +13,16 @@ mod verdict;
 
 pub use explanation_text::explanation_text;
 pub use model_text::{ModelText, model_text};
+pub(crate) use model_text::{fit_table, method};
 pub use orders::comparison;
+pub(crate) use orders::order_table;
 pub use reproduction_text::reproduction_text;
+pub(crate) use roots::{gain_table, pole_table};
 pub use show::show_text;
-pub(crate) use validation_text::findings;
+pub(crate) use table::Table;
 pub use validation_text::validation_text;
+pub(crate) use validation_text::{findings, test_tables};
+pub(crate) use verdict::doubtful;
 pub use verdict::verdict;
 
 /// Widest line.

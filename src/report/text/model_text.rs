@@ -101,6 +101,15 @@ pub(super) fn dynamics(model: &Model, described: &Invariants, most: usize, style
 
 /// Fit of each output.
 pub(super) fn fit(tests: &Validation) -> String {
+    let mut out = format!("\nFit\n{}", fit_table(tests).lines());
+    if let Some(reason) = &tests.free_run_unavailable {
+        out.push_str(&wrapped("  no free run: ", reason));
+    }
+    out
+}
+
+/// The same as a table.
+pub(crate) fn fit_table(tests: &Validation) -> Table {
     let mut table = Table::new([
         "output",
         "one step ahead",
@@ -118,19 +127,20 @@ pub(super) fn fit(tests: &Validation) -> String {
             free.map_or("-".to_owned(), |f| significant(f.rms_error, 4)),
         ]);
     }
-    let mut out = format!("\nFit\n{}", table.lines());
-    if let Some(reason) = &tests.free_run_unavailable {
-        out.push_str(&wrapped("  no free run: ", reason));
-    }
-    out
+    table
 }
 
 /// How the numbers came about.
 fn how(summary: &Summary) -> String {
     let mut out = String::from("\nHow\n");
-    for sentence in &summary.explanation {
+    for sentence in summary.explanation.iter().chain([&method(summary)]) {
         out.push_str(&wrapped("  ", sentence));
     }
+    out
+}
+
+/// Algorithm, windows, polish and covariance.
+pub(crate) fn method(summary: &Summary) -> String {
     let polish = if summary.polished {
         "polished to maximum likelihood"
     } else {
@@ -149,16 +159,12 @@ fn how(summary: &Summary) -> String {
     let stochastic = summary
         .stochastic
         .map_or(String::new(), |step| format!(" with K by {}", step.name()));
-    out.push_str(&wrapped(
-        "  ",
-        &format!(
-            "{}{stochastic}, past window {}, future window {}, {polish}; {covariance}",
-            summary.method.name(),
-            summary.horizons.past,
-            summary.horizons.future
-        ),
-    ));
-    out
+    format!(
+        "{}{stochastic}, past window {}, future window {}, {polish}; {covariance}",
+        summary.method.name(),
+        summary.horizons.past,
+        summary.horizons.future
+    )
 }
 
 impl fmt::Display for Model {

@@ -9,30 +9,34 @@ const NEIGHBOURS: usize = 2;
 
 /// The evidence around the chosen order, and on every order that was tested.
 pub(super) fn order_evidence(summary: &Summary) -> String {
+    titled("Order", &order_table(summary))
+}
+
+/// The same as a table; the chosen order has a star.
+pub(crate) fn order_table(summary: &Summary) -> Table {
     let chosen = summary.order;
     let shown = |e: &&OrderEvidence| e.order.abs_diff(chosen) <= NEIGHBOURS || e.p_value.is_some();
-    table(
-        "Order",
-        summary,
-        summary.diagnostics.orders.iter().filter(shown),
-    )
+    table(summary, summary.diagnostics.orders.iter().filter(shown))
 }
 
 /// The comparison of the orders that were asked for.
 pub fn comparison(summary: &Summary, asked: &[usize]) -> String {
     let among = |e: &&OrderEvidence| asked.contains(&e.order);
-    table(
-        "Orders asked for",
-        summary,
-        summary.diagnostics.orders.iter().filter(among),
+    let evidence = summary.diagnostics.orders.iter();
+    titled("Orders asked for", &table(summary, evidence.filter(among)))
+}
+
+fn titled(title: &str, table: &Table) -> String {
+    if table.is_empty() {
+        return String::new();
+    }
+    format!(
+        "\n{title} (* chosen; small p speaks against an order, small criteria for it)\n{}",
+        table.lines()
     )
 }
 
-fn table<'a>(
-    title: &str,
-    summary: &Summary,
-    evidence: impl Iterator<Item = &'a OrderEvidence>,
-) -> String {
+fn table<'a>(summary: &Summary, evidence: impl Iterator<Item = &'a OrderEvidence>) -> Table {
     let mut table = Table::new([
         "order",
         "correlation",
@@ -65,11 +69,5 @@ fn table<'a>(
                 .map_or("-".to_owned(), |r| format!("{r:.4}")),
         ]);
     }
-    if table.is_empty() {
-        return String::new();
-    }
-    format!(
-        "\n{title} (* chosen; small p speaks against an order, small criteria for it)\n{}",
-        table.lines()
-    )
+    table
 }

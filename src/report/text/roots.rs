@@ -13,6 +13,16 @@ pub(super) fn poles(title: &str, roots: &[Root], most: usize, style: Style) -> S
     if roots.is_empty() {
         return String::new();
     }
+    let more = roots.iter().filter(|root| root.imag >= 0.0).count();
+    format!(
+        "\n{title}\n{}{}",
+        pole_table(roots, most, style).lines(),
+        and_more(more, most)
+    )
+}
+
+/// The same as a table.
+pub(crate) fn pole_table(roots: &[Root], most: usize, style: Style) -> Table {
     let mut table = Table::new([
         "",
         "natural frequency [Hz]",
@@ -20,8 +30,7 @@ pub(super) fn poles(title: &str, roots: &[Root], most: usize, style: Style) -> S
         "damping",
         "time constant [s]",
     ]);
-    let lines = || roots.iter().filter(|root| root.imag >= 0.0);
-    for root in lines().take(most) {
+    for root in roots.iter().filter(|root| root.imag >= 0.0).take(most) {
         table.row([
             kind(root),
             with_std(root.natural_frequency_hz, root.natural_frequency_std, style),
@@ -38,11 +47,7 @@ pub(super) fn poles(title: &str, roots: &[Root], most: usize, style: Style) -> S
             with_std(root.time_constant_s, root.time_constant_std, style),
         ]);
     }
-    format!(
-        "\n{title}\n{}{}",
-        table.lines(),
-        and_more(lines().count(), most)
-    )
+    table
 }
 
 /// Says that a list was cut.
@@ -103,6 +108,25 @@ pub(super) fn static_gains(
     outputs: &[Channel],
     style: Style,
 ) -> String {
+    let table = gain_table(gains, most, inputs, outputs, style);
+    if table.is_empty() {
+        return String::new();
+    }
+    format!(
+        "\n{title}\n{}{}",
+        table.lines(),
+        and_more(gains.len(), most)
+    )
+}
+
+/// The same as a table.
+pub(crate) fn gain_table(
+    gains: &[StaticGain],
+    most: usize,
+    inputs: &[Channel],
+    outputs: &[Channel],
+    style: Style,
+) -> Table {
     let mut table = Table::new(["from", "to", "gain", ""])
         .flush_left(1)
         .flush_left(3);
@@ -131,14 +155,7 @@ pub(super) fn static_gains(
             shortened(&units),
         ]);
     }
-    if table.is_empty() {
-        return String::new();
-    }
-    format!(
-        "\n{title}\n{}{}",
-        table.lines(),
-        and_more(gains.len(), most)
-    )
+    table
 }
 
 /// A name that leaves room for the numbers.

@@ -35,36 +35,42 @@ impl Table {
         self.rows.len() < 2
     }
 
+    /// The columns in which some row has something: the header, then a cell for each row, and whether it is set flush
+    /// left.
+    pub(crate) fn columns(&self) -> Vec<(Vec<&str>, bool)> {
+        let count = self.rows.first().map_or(0, Vec::len);
+        (0..count)
+            .map(|c| {
+                let cells = self.rows.iter();
+                let cells = cells.map(|row| row.get(c).map_or("", String::as_str));
+                (cells.collect(), self.left.contains(&c))
+            })
+            .filter(|(cells, _): &(Vec<&str>, bool)| {
+                cells.iter().skip(1).any(|cell| !matches!(*cell, "" | "-"))
+            })
+            .collect()
+    }
+
     /// The lines, indented by two spaces. A column in which no row has anything is left out.
     pub(crate) fn lines(&self) -> String {
-        let columns = self.rows.first().map_or(0, Vec::len);
-        let cell = |row: &Vec<String>, c: usize| row.get(c).cloned().unwrap_or_default();
-        let mut widths = Vec::new();
-        for c in 0..columns {
-            let filled = self
-                .rows
-                .iter()
-                .skip(1)
-                .any(|row| !matches!(cell(row, c).as_str(), "" | "-"));
-            let width = self.rows.iter().map(|row| cell(row, c).chars().count());
-            widths.push(filled.then_some(width.max().unwrap_or(0)));
-        }
+        let columns = self.columns();
+        let width = |cells: &[&str]| cells.iter().map(|c| c.chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = columns.iter().map(|(cells, _)| width(cells)).collect();
         let mut out = String::new();
-        for row in &self.rows {
+        for index in 0..self.rows.len() {
             let mut line = String::from(" ");
             let mut gap = 1;
-            for (c, width) in widths.iter().enumerate() {
-                let Some(width) = width else { continue };
-                let text = cell(row, c);
+            for ((cells, left), width) in columns.iter().zip(&widths) {
+                let text = cells[index];
                 let pad = " ".repeat(width - text.chars().count());
                 line.push_str(&" ".repeat(gap));
                 gap = GAP;
-                if self.left.contains(&c) {
-                    line.push_str(&text);
+                if *left {
+                    line.push_str(text);
                     line.push_str(&pad);
                 } else {
                     line.push_str(&pad);
-                    line.push_str(&text);
+                    line.push_str(text);
                 }
             }
             out.push_str(line.trim_end());

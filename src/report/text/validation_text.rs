@@ -46,6 +46,21 @@ pub(crate) fn findings(tests: &Validation) -> Vec<String> {
 }
 
 fn residual_tests(tests: &Validation) -> String {
+    let (table, strongest) = test_tables(tests);
+    if table.is_empty() {
+        return String::new();
+    }
+    format!(
+        "\nTests of the residuals, {} (share: of their variance; * for information)\n{}\
+         \nStrongest correlations\n{}",
+        count(tests.lags, "lag"),
+        table.lines(),
+        strongest.lines()
+    )
+}
+
+/// The tests, and the correlation of each that stands out most.
+pub(crate) fn test_tables(tests: &Validation) -> (Table, Table) {
     let mut table = Table::new(["explained by", "chi-square", "freedom", "p", "share"]);
     let mut strongest = Table::new([
         "explained by",
@@ -84,16 +99,7 @@ fn residual_tests(tests: &Validation) -> String {
             format!("{:.3}", most.bound_99),
         ]);
     }
-    if table.is_empty() {
-        return String::new();
-    }
-    format!(
-        "\nTests of the residuals, {} (share: of their variance; * for information)\n{}\
-         \nStrongest correlations\n{}",
-        count(tests.lags, "lag"),
-        table.lines(),
-        strongest.lines()
-    )
+    (table, strongest)
 }
 
 fn sizes(tests: &Validation) -> String {

@@ -28,13 +28,21 @@ pub fn verdict(model: &Model, tests: Option<&Validation>) -> String {
     }
 }
 
+/// Whether something speaks against the model.
+pub(crate) fn doubtful(summary: &Summary, tests: Option<&Validation>) -> bool {
+    summary.diagnostics.predictor_radius >= 1.0
+        || tests.is_some_and(|t| t.rejected)
+        || order_too_low(summary)
+}
+
+fn order_too_low(summary: &Summary) -> bool {
+    let test = summary.diagnostics.order_test.as_ref();
+    test.and_then(|test| test.p_value)
+        .is_some_and(|p| p < ORDER_TEST_LEVEL)
+}
+
 fn judgement(summary: &Summary, tests: Option<&Validation>) -> String {
-    let order_too_low = summary
-        .diagnostics
-        .order_test
-        .as_ref()
-        .and_then(|test| test.p_value)
-        .is_some_and(|p| p < ORDER_TEST_LEVEL);
+    let order_too_low = order_too_low(summary);
     let vanished = tests.is_some_and(|t| t.whiteness.is_none() && t.past_inputs.is_none());
     let rejected = tests.is_some_and(|t| t.rejected);
     let unstable_predictor = summary.diagnostics.predictor_radius >= 1.0;
@@ -55,7 +63,7 @@ fn judgement(summary: &Summary, tests: Option<&Validation>) -> String {
         0 => main.to_owned(),
         // The verdict says already what this one warns of.
         1 if order_too_low => main.to_owned(),
-        n if rejected || order_too_low || unstable_predictor => {
+        n if doubtful(summary, tests) => {
             format!("{main}; see {}", count(n, "warning"))
         }
         n => format!("{main}, but see {}", count(n, "warning")),

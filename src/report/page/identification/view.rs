@@ -1,0 +1,200 @@
+//! Everything the template is given.
+
+use serde::Serialize;
+
+use super::head::{Head, Table, sections};
+use super::number::{exact, with_unit};
+use super::plot::Group;
+use super::{PageError, order, poles, recording, residuals, response};
+use crate::covariance::invariants;
+use crate::identify::{IdentifiedChannel, Model};
+use crate::report::names;
+use crate::report::overview::Overview;
+use crate::report::text::{
+    Style, doubtful, findings, fit_table, gain_table, method, order_table, pole_table, test_tables,
+    verdict,
+};
+use crate::validate::Validation;
+
+/// Frequencies of a response.
+const FREQUENCIES: usize = 120;
+/// Rows of a table.
+const ROWS: usize = 24;
+
+/// The page as the template sees it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct View {
+    #[serde(flatten)]
+    head: Head,
+    kind: &'static str,
+    headline: String,
+    about: String,
+    remarks: Vec<String>,
+    fit: Option<Table>,
+    no_free_run: Option<String>,
+    evidence: Vec<Group>,
+    orders: Option<Table>,
+    how: Vec<String>,
+    frequency: Vec<Group>,
+    map: Option<Group>,
+    poles: Option<Table>,
+    gains: Option<Table>,
+    steps: Vec<Group>,
+    tests: Option<Table>,
+    strongest: Option<Table>,
+    residuals: Vec<Group>,
+    recordings: Vec<Group>,
+    sources: Vec<Source>,
+    facts: Vec<(&'static str, String)>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Source {
+    name: String,
+    samples: usize,
+    start: String,
+    sha256: Option<String>,
+}
+
+/// The page of a model.
+pub(super) fn view(
+    model: &Model,
+    tests: Option<&Validation>,
+    overview: Option<&Overview>,
+) -> Result<View, PageError> {
+    let described = invariants(
+        &model.system,
+        model.covariance.as_ref(),
+        &names(&model.outputs),
+        &names(&model.inputs),
+        &model.system.default_frequencies(FREQUENCIES)?,
+        model.summary.as_ref().map_or(0, |s| s.options.seed),
+    )?;
+    let summary = model.summary.as_ref();
+    let sentence = verdict(model, tests);
+    let (about, headline) = match sentence.split_once(": ") {
+        Some((about, judgement)) => (format!("{about}."), judgement),
+        None => (String::new(), sentence.as_str()),
+    };
+    let doubt = summary.is_some_and(|s| doubtful(s, tests));
+    let (kind, class) = match (doubt, tests.is_some()) {
+        (true, _) => ("Doubtful", "is-doubtful"),
+        (false, true) => ("Accepted", "is-accepted"),
+        (false, false) => ("Not tested", "is-untested"),
+    };
+    let remarks = summary.iter().flat_map(|s| s.warnings.clone());
+    let remarks = remarks.chain(tests.iter().flat_map(|t| findings(t)));
+    // A sentence that begins with the name of a channel keeps it as it is.
+    let channels = || model.inputs.iter().chain(&model.outputs);
+    let begins_with_name = |text: &str| channels().any(|c| text.starts_with(&c.channel.name));
+    let as_sentence = |text: String| {
+        let text = match begins_with_name(&text) {
+            true => text,
+            false => capitalised(&text),
+        };
+        format!("{}.", text.trim_end_matches('.'))
+    };
+    let style = Style::UNICODE;
+    let channels_of =
+        |of: &[IdentifiedChannel]| of.iter().map(|c| c.channel.clone()).collect::<Vec<_>>();
+    let gains = gain_table(
+        &described.static_gain,
+        ROWS,
+        &channels_of(&model.inputs),
+        &channels_of(&model.outputs),
+        style,
+    );
+    let tables = tests.map(test_tables);
+    let evidence = summary.map(order::pictures).unwrap_or_default();
+    let recordings = overview
+        .map(|o| recording::pictures(o, model))
+        .unwrap_or_default();
+    let poles_known = pole_table(&described.poles, ROWS, style);
+    Ok(View {
+        head: Head {
+            title: format!("{}: {headline}", model.recordings.first().map_or("Model", |r| r.name.as_str())),
+            class,
+            command: "identify",
+            names: model.recordings.iter().map(|r| r.name.clone()).collect(),
+            sections: sections(&[
+                ("order", "Order", summary.is_some()),
+                ("frequency", "Frequency", true),
+                ("poles", "Poles", true),
+                ("step", "Step", true),
+                ("residuals", "Residuals", tests.is_some()),
+                ("recordings", "Recording", !recordings.is_empty()),
+                ("provenance", "Provenance", true),
+            ]),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        },
+        kind,
+        headline: capitalised(headline),
+        about,
+        remarks: remarks.map(as_sentence).collect(),
+        fit: tests.and_then(|t| Table::of(&fit_table(t), "")),
+        no_free_run: tests.and_then(|t| t.free_run_unavailable.clone()),
+        evidence,
+        orders: summary
+            .and_then(|s| Table::of(&order_table(s), "Orders around the one chosen (bold); small p speaks against an order, small criteria for it"))
+            .map(Table::with_stars_marked),
+        how: summary
+            .map(|s| {
+                let how = s.explanation.iter().cloned().chain([format!("method: {}", method(s))]);
+                how.map(|h| format!("{}.", capitalised(&h).trim_end_matches('.'))).collect()
+            })
+            .unwrap_or_default(),
+        frequency: response::frequency(&described),
+        map: poles::map(&described, model),
+        poles: Table::of(&poles_known, "Poles, ± one standard deviation"),
+        gains: Table::of(&gains, "Static gains, ± one standard deviation"),
+        steps: response::steps(&described, model),
+        tests: tables.as_ref().and_then(|t| {
+            Table::of(&t.0, "Tests of the residuals: can they be foreseen? A small p says yes; the share says how much of their variance (* for information)")
+        }),
+        strongest: tables.as_ref().and_then(|t| Table::of(&t.1, "Strongest correlations")),
+        residuals: tests.map(residuals::pictures).unwrap_or_default(),
+        recordings,
+        sources: model
+            .recordings
+            .iter()
+            .map(|r| Source {
+                name: r.name.clone(),
+                samples: r.samples,
+                start: with_unit(&exact(r.start_time), "s"),
+                sha256: r.sha256.clone(),
+            })
+            .collect(),
+        facts: vec![
+            ("Inputs", listed(&model.inputs)),
+            ("Outputs", listed(&model.outputs)),
+            ("Sample time", with_unit(&exact(model.system.sample_time), "s")),
+            ("Written by", format!("innovant {}", env!("CARGO_PKG_VERSION"))),
+        ],
+    })
+}
+
+/// The first letter large.
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    match letters.next() {
+        Some(first) => first.to_uppercase().chain(letters).collect(),
+        None => String::new(),
+    }
+}
+
+fn listed(of: &[IdentifiedChannel]) -> String {
+    let names: Vec<String> = of
+        .iter()
+        .map(|c| {
+            let mut text = match &c.channel.unit {
+                Some(unit) => format!("{} [{unit}]", c.channel.name),
+                None => c.channel.name.clone(),
+            };
+            if c.delay > 0 {
+                text.push_str(&format!(" (known delay: {} samples)", c.delay));
+            }
+            text
+        })
+        .collect();
+    names.join(", ")
+}

@@ -1,0 +1,26 @@
+//! The page of a reproduction.
+//!
+//! | file | one idea |
+//! |---|---|
+//! | `view` | everything the template is given |
+//! | `pictures` | lines and bars |
+//! | `reproduction.html` | the template |
+
+mod pictures;
+mod view;
+
+#[cfg(test)]
+mod tests;
+
+use super::{PageError, head, number, plot, render};
+use crate::reproduce::Reproduction;
+
+const TEMPLATES: [(&str, &str); 1] = [("reproduction", include_str!("reproduction.html"))];
+
+/// The reproduction as a page to open in a browser.
+///
+/// # Errors
+/// When the template cannot be filled, which no reproduction should bring about.
+pub fn reproduction_page(reproduction: &Reproduction) -> Result<String, PageError> {
+    render(&TEMPLATES, &view::view(reproduction))
+}
