@@ -1,13 +1,15 @@
 //! The model: matrices, what it foresees, whether it holds, and its document.
 
 use std::mem;
+use std::path::PathBuf;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use innovant::Options;
 use innovant::identify::{IdentifyError, Records, identify_records};
+use innovant::log::write_file_atomically;
 use innovant::moments::Detrend;
 use innovant::report::text::{ModelText, Style, model_text, validation_text, verdict};
-use innovant::report::{ModelDocument, parse_model, to_json};
+use innovant::report::{ModelDocument, identification_page, parse_model, to_json};
 use innovant::validate::{Deviations, Relation, TestedModel, Zero, judge, test_residuals};
 use nalgebra::DVector;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, ToPyArray};
@@ -237,6 +239,15 @@ impl Model {
         ModelDocument::new(model)
             .and_then(|document| document.with_residual_tests(tests.clone()).to_json())
             .map_err(raise)
+    }
+
+    /// Writes the page; the file appears whole or not at all.
+    fn report(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let TestedModel { model, tests } = self.tested(py);
+        py.detach(|| {
+            let page = identification_page(model, tests.as_ref(), None).map_err(raise)?;
+            write_file_atomically(&path, page.as_bytes()).map_err(raise)
+        })
     }
 
     #[staticmethod]

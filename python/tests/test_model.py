@@ -163,3 +163,10 @@ def test_plots(model, backend):
         assert len(poles.axes[0].patches) == 4
     with pytest.raises(innovant.InnovantError, match="backend"):
         model.plot_bode(backend="crayon")
+
+
+def test_the_page_is_one_file(model, tmp_path):
+    model.report(tmp_path / "page.html")
+    assert list(tmp_path.iterdir()) == [tmp_path / "page.html"]
+    page = (tmp_path / "page.html").read_text()
+    assert "<html" in page and "Frequency response" in page

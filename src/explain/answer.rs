@@ -492,10 +492,10 @@ impl Answer<'_> {
         let given = &self.finding.boring.given;
         let mut traces = Vec::new();
         for (s, segment) in data.segments.iter().enumerate() {
-            let stride = segment.samples().div_ceil(TRACE_POINTS).max(1);
-            let thin = |v: &[f64]| -> Vec<f64> { v.iter().step_by(stride).copied().collect() };
             for o in 0..l {
                 let series = s * l + o;
+                let shown = extremes(&given.residual[series], TRACE_POINTS);
+                let thin = |v: &[f64]| -> Vec<f64> { shown.iter().map(|k| v[*k]).collect() };
                 let before = locate::spectrum(&boring.residual, l, o, data.sample_time);
                 let after = locate::spectrum(&model.residual, l, o, data.sample_time);
                 // In the units of the recording, also where the engine works relative to a simulator.
@@ -520,9 +520,9 @@ impl Answer<'_> {
                     output: self.outputs()[o].name.clone(),
                     unit: self.outputs()[o].unit.clone().unwrap_or_default(),
                     recording: s,
-                    time: (0..segment.samples())
-                        .step_by(stride)
-                        .map(|k| segment.start_time + k as f64 * data.sample_time)
+                    time: shown
+                        .iter()
+                        .map(|k| segment.start_time + *k as f64 * data.sample_time)
                         .collect(),
                     recorded: thin(recorded),
                     simulated: back(&given.simulated[series]),
@@ -533,5 +533,50 @@ impl Answer<'_> {
             }
         }
         traces
+    }
+}
+
+/// Samples that stand for all, at most about `most`: the smallest and the largest value of each stretch, so that no peak
+/// of the error is lost.
+fn extremes(error: &[f64], most: usize) -> Vec<usize> {
+    if error.len() <= most {
+        return (0..error.len()).collect();
+    }
+    let stretch = error.len().div_ceil(most / 2);
+    let mut shown = Vec::with_capacity(most + 2);
+    for (i, values) in error.chunks(stretch).enumerate() {
+        let place = |better: fn(&f64, &f64) -> bool| {
+            i * stretch
+                + (1..values.len()).fold(0, |best, k| {
+                    if better(&values[k], &values[best]) {
+                        k
+                    } else {
+                        best
+                    }
+                })
+        };
+        let (low, high) = (place(|a, b| a < b), place(|a, b| a > b));
+        shown.push(low.min(high));
+        if low != high {
+            shown.push(low.max(high));
+        }
+    }
+    shown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::extremes;
+
+    #[test]
+    fn thinning_keeps_every_peak() {
+        let mut error: Vec<f64> = (0..100_000).map(|k| (0.01 * f64::from(k)).sin()).collect();
+        error[77_777] = 9.0;
+        error[77_780] = -8.0;
+        let shown = extremes(&error, 1500);
+        assert!(shown.len() <= 1502, "{}", shown.len());
+        assert!(shown.contains(&77_777) && shown.contains(&77_780));
+        assert!(shown.windows(2).all(|pair| pair[0] < pair[1]));
+        assert_eq!(extremes(&error[..10], 1500), (0..10).collect::<Vec<_>>());
     }
 }

@@ -329,6 +329,13 @@ class Model:
 
         return plots.poles(self, backend)
 
+    def report(self, path: str | Path) -> None:
+        """Write the page with pictures: one HTML file that opens offline.
+
+        What the recording looked like is on the page of the command line only; a model does not keep it.
+        """
+        self._core.report(str(path))
+
     def to_json(self, path: str | Path | None = None) -> str:
         """The document `innovant-model/1`, as the command line writes it; also into a file."""
         text = self._core.to_json()

@@ -212,6 +212,6 @@ impl Plan {
 pub(super) fn failures(outcomes: &[Outcome], runs: usize) -> Vec<String> {
     outcomes
         .iter()
-        .filter_map(|o| words::failures(&o.algorithm.name, o.failed, runs))
+        .filter_map(|o| words::failures(o.algorithm.name, o.failed, runs))
         .collect()
 }
