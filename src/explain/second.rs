@@ -27,6 +27,15 @@ pub(crate) fn required(single: f64) -> f64 {
     SECOND_GAIN.max(SECOND_SHARE * single)
 }
 
+/// Forms of a first effect (its variants, the plant free and as given) beside which a second is looked for.
+const FORMS: usize = 4;
+
+fn same_form(a: &Ranked, b: &Ranked) -> bool {
+    let definition = |r: &Ranked| r.fit.structure.new_effects()[0].definition;
+    std::ptr::eq(definition(a), definition(b))
+        && a.fit.structure.plant_free == b.fit.structure.plant_free
+}
+
 /// A second effect beside one of the two best singles, where the best single leaves something; `before` is the best
 /// explanation without any.
 pub(crate) fn pair(
@@ -46,21 +55,20 @@ pub(crate) fn pair(
         .iter()
         .find(|r| id(r) != id(best) && id(r) != "extra_mode");
     let single_gain = base - best.criterion;
-    // The two best effects, each with the plant free and as given: a free plant may hide the second effect. One after
+    // The two best effects, each in its best forms: a free plant may hide the second effect, and the side of a limit
+    // may only look right without it. One after
     // the other, since the best pair of one would keep those of the other from being pursued.
     let first = |r: &Ranked| r.fit.structure.new_effects()[0].definition.id;
     let mut found: Vec<Ranked> = [Some(best), other]
         .into_par_iter()
         .flatten()
         .flat_map_iter(|named| {
-            let forms: Vec<&Ranked> = [true, false]
-                .iter()
-                .filter_map(|free| {
-                    ranked
-                        .iter()
-                        .find(|r| id(r) == id(named) && r.fit.structure.plant_free == *free)
-                })
-                .collect();
+            let mut forms: Vec<&Ranked> = Vec::new();
+            for r in ranked.iter().filter(|r| id(r) == id(named)) {
+                if forms.len() < FORMS && !forms.iter().any(|f| same_form(f, r)) {
+                    forms.push(r);
+                }
+            }
             let pairs = second_effects(problem, &forms, allowed);
             let mut refined = derived(problem, REFINEMENTS, &pairs, base, allowed);
             refined.extend(pairs);
