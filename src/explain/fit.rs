@@ -34,13 +34,13 @@ impl Effort {
     /// To see what deserves more.
     pub const SCOUT: Self = Self {
         rounds: 1,
-        derivatives: 2,
+        derivatives: 3,
         settled: 0.5,
     };
     /// To rank candidates.
     pub const RANK: Self = Self {
         rounds: 2,
-        derivatives: 5,
+        derivatives: 7,
         settled: 0.1,
     };
     /// To report.
