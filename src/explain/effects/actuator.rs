@@ -2,6 +2,9 @@
 
 use super::{Action, Clock, Definition, Mimic, Observed, Parameter, Unit, level};
 
+/// What tells a delay from a lag.
+const A_STEP: &str = "faster sampling and a step: after a delay nothing moves at first, after a lag it moves at once";
+
 pub(super) static ENTRIES: &[Definition] = &[
     Definition {
         id: "input_saturation",
@@ -113,16 +116,10 @@ pub(super) static ENTRIES: &[Definition] = &[
         variant: "",
         name: "delay of the input",
         equation: "u_eff(t) = u(t - delay)",
-        parameters: &[Parameter {
-            name: "delay",
-            unit: Unit::Second,
-            logarithmic: false,
-            lower: 0.0,
-            upper: 1e12,
-        }],
+        parameters: &[Parameter::between("delay", Unit::Second, 0.0, 1e12)],
         mimics: &[Mimic {
             effect: "actuator_lag",
-            experiment: "faster sampling and a step: after a delay nothing moves at first, after a lag it moves at once",
+            experiment: A_STEP,
         }],
         linear: &[],
         persists: true,
@@ -141,7 +138,7 @@ pub(super) static ENTRIES: &[Definition] = &[
         parameters: &[Parameter::positive("time_constant", Unit::Second)],
         mimics: &[Mimic {
             effect: "input_delay",
-            experiment: "faster sampling and a step: after a delay nothing moves at first, after a lag it moves at once",
+            experiment: A_STEP,
         }],
         linear: &[],
         persists: true,
@@ -181,13 +178,7 @@ pub(super) static ENTRIES: &[Definition] = &[
         variant: "interpolated",
         name: "delay of the command, interpolated and held between samples",
         equation: "u_eff[k] = (1 - f) u[k-d] + f u[k-d-1]",
-        parameters: &[Parameter {
-            name: "delay",
-            unit: Unit::Second,
-            logarithmic: false,
-            lower: 0.0,
-            upper: 1e12,
-        }],
+        parameters: &[Parameter::between("delay", Unit::Second, 0.0, 1e12)],
         mimics: &[],
         linear: &[],
         persists: true,
