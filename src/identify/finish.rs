@@ -158,9 +158,14 @@ pub fn finish(
         let layout = ParameterLayout::of(&system, varx.feedthrough);
         let replicates: Vec<Vec<f64>> = replicates.iter().map(|s| layout.pack(s)).collect();
         jackknife_covariance(layout, &replicates).ok_or_else(|| {
+            let (whose, instead) = match options.covariance {
+                CovarianceKind::Robust => ("--covariance robust", "--covariance model"),
+                // Estimates without a formula of their own.
+                CovarianceKind::Model => ("the covariance of this method", "--polish always"),
+            };
             IdentifyError::Option(format!(
-                "--covariance robust needs at least 3 blocks of data, and only {} could be made: give a longer \
-                 recording, a smaller --past, or --covariance model",
+                "{whose} needs at least 3 blocks of data, and only {} could be made: give a longer recording, a \
+                 smaller --past, or {instead}",
                 replicates.len()
             ))
         })?
