@@ -59,10 +59,9 @@ pub fn explain(
     let drive = weak::attempt(recordings, &known, &allowed);
     // What the averaged equation explains to noise needs no other way.
     let settled = drive.as_ref().is_some_and(|(_, finding, _)| {
-        finding.verdict != Verdict::Unexplained
-            && finding
-                .adequacy
-                .is_none_or(|a| a.p_value > super::adequacy::LEVEL || a.share < MOSTLY_NOISE)
+        finding
+            .adequacy
+            .is_none_or(|a| a.p_value > super::adequacy::LEVEL || a.share < MOSTLY_NOISE)
     });
     let ordinary = (!settled)
         .then(|| inquire(&known.data, &known.structure, &allowed))
@@ -93,18 +92,14 @@ pub fn explain(
 
 /// Whether a free-run fit tells more of a drive than its averaged equation, which leaves structure.
 fn tells_more(free_run: &Finding, averaged: &Finding, data: &Data) -> bool {
-    // Where a free run drifts, a trend stands for whatever it misses; unless nothing is left.
+    // Where a free run drifts, a trend stands for whatever it misses.
     let trend = free_run.model.structure.new_effects().iter().any(|e| {
         matches!(
             e.definition.id,
             "sensor_drift" | "sensor_offset" | "load_step" | "periodic_disturbance"
         )
     });
-    let leaves_noise = |a: &super::adequacy::Adequacy| a.p_value > super::adequacy::LEVEL;
-    if trend
-        && averaged.weak.as_ref().is_some_and(|proof| proof.drifts())
-        && !free_run.adequacy.as_ref().is_some_and(leaves_noise)
-    {
+    if trend && averaged.weak.as_ref().is_some_and(|proof| proof.drifts()) {
         return false;
     }
     averaged.verdict != Verdict::Named

@@ -22,13 +22,13 @@ pub(crate) fn holds(a: &Adequacy) -> bool {
 }
 
 /// Broken lines in rate, position, input and time, fitted beside the equation's own columns; `before` is the sum of
-/// squares without what was found, if anything was.
+/// squares without what was found.
 pub(crate) fn adequacy(
     windows: &Windows,
     data: &Data,
     equation: &Equation,
     fit: &Regression,
-    before: Option<f64>,
+    before: f64,
 ) -> Option<Adequacy> {
     let n = windows.places.len();
     let clock = |s: usize, k: usize| data.segments[s].start_time + k as f64 * data.sample_time;
@@ -68,9 +68,7 @@ pub(crate) fn adequacy(
         // The best of several families was taken (Bonferroni).
         p_value: (p_value * families.len() as f64).min(1.0),
         share,
-        of_removed: before.map_or(f64::INFINITY, |before| {
-            share * fit.squares / (before - fit.squares).max(1e-300)
-        }),
+        of_removed: share * fit.squares / (before - fit.squares).max(1e-300),
     })
 }
 

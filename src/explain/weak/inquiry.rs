@@ -320,7 +320,7 @@ fn decide(chosen: &Ranking, data: &Data, problem: &Problem) -> Option<Decided> {
             data,
             &first.equation,
             &fit,
-            Some(plain.regression.squares),
+            plain.regression.squares,
         )
     });
     let suffices = left.as_ref().is_none_or(holds);
@@ -403,7 +403,14 @@ fn finding(
     let model = as_fit(problem, &equation, &fit)?;
     let linear = as_fit(problem, &plain.equation, &linear)?;
     let found = !equation.laws.is_empty();
-    let before = found.then_some(plain.regression.squares);
+    let n = windows.force.len() as f64;
+    let mean = windows.force.iter().sum::<f64>() / n;
+    // Mass and viscous friction are as imperfect as any law.
+    let before = if found {
+        plain.regression.squares
+    } else {
+        windows.force.iter().map(|f| (f - mean).powi(2)).sum()
+    };
     let adequacy = adequacy(windows, data, &equation, &regression, before);
     let adequate = adequacy.as_ref().is_none_or(holds);
     let (train, test) = prove::split(data, &problem.mask);
