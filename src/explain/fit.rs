@@ -16,16 +16,18 @@ const STEP_SHARE: f64 = 1e-5;
 /// Steps stay between these, whatever the outputs do.
 const SMALLEST_STEP: f64 = 1e-30;
 const LARGEST_STEP: f64 = 1e30;
-/// Steps that are made with one set of derivatives, updated from what each step has shown, before they are taken anew.
-const STEPS_EACH: usize = 4;
 
 /// How hard a fit tries.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
     /// Rounds of noise estimation.
     pub rounds: usize,
-    /// Sets of derivatives a round: they are what costs, and each serves a few steps.
+    /// Sets of derivatives a round: they are what costs.
     pub derivatives: usize,
+    /// Steps that are made with one set before it is taken anew.
+    pub steps_each: usize,
+    /// Whether a set is updated from what each step has shown: far from the optimum it changes quickly.
+    pub updates: bool,
     /// The deviance has settled when a step lowers it by less.
     pub settled: f64,
 }
@@ -35,18 +37,24 @@ impl Effort {
     pub const SCOUT: Self = Self {
         rounds: 1,
         derivatives: 3,
+        steps_each: 4,
+        updates: true,
         settled: 0.5,
     };
     /// To rank candidates.
     pub const RANK: Self = Self {
         rounds: 2,
         derivatives: 7,
+        steps_each: 4,
+        updates: true,
         settled: 0.1,
     };
     /// To report.
     pub const FINAL: Self = Self {
         rounds: 3,
         derivatives: 20,
+        steps_each: 2,
+        updates: false,
         settled: 0.02,
     };
 }
@@ -216,7 +224,7 @@ impl Fit {
         let mut age = 0;
         let mut taken = 0;
         loop {
-            if age >= STEPS_EACH {
+            if age >= effort.steps_each {
                 jacobian = None;
             }
             let fresh = jacobian.is_none();
@@ -272,14 +280,16 @@ impl Fit {
                 }
             }
             age += 1;
-            if let (Some(derivatives), Some((step, before))) = (&mut jacobian, made) {
+            if let (true, Some(derivatives), Some((step, before))) =
+                (effort.updates, &mut jacobian, made)
+            {
                 derivatives.update(problem, noise, &step, &before, &self.simulated);
             }
             match gained {
                 Some(gained) if gained >= effort.settled => {}
                 // Little or nothing: the end with new derivatives, else a reason to take them anew.
                 _ if fresh => return,
-                _ => age = STEPS_EACH,
+                _ => age = effort.steps_each,
             }
         }
     }
