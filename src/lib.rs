@@ -52,11 +52,15 @@
 //! | [`linalg`] | the only place that names faer |
 //! | [`systems`] | the papers' examples, simulated, for tests and benchmarks |
 //!
+//! The equations, from the recording to the covariance and to what a simulation leaves out, are one chapter:
+//! [`mathematics`].
+//!
 //! # References
 //! - J.W. van Wingerden, *The asymptotic variance of the PBSIDopt algorithm* (equation numbers in this
 //!   documentation are that paper's; its printed sign of the terms beta in Appendix B is wrong, see
 //!   [`covariance`]).
 //! - A. Chiuso, G. Picci, *Estimating the asymptotic variance of closed loop subspace estimators*.
+//! - T. Knudsen, *Subspace identification - reducing uncertainty on the stochastic part*.
 
 pub mod batch;
 pub mod cli;
@@ -71,5 +75,21 @@ pub mod report;
 pub mod reproduce;
 pub mod systems;
 pub mod validate;
+
+// The formulas are drawn by KaTeX, which the page carries with it, so that it opens offline; the fonts that the formulas
+// use stand in the style sheet. The lint reads the script as HTML.
+#[cfg(doc)]
+#[allow(rustdoc::invalid_html_tags)]
+#[doc = include_str!("../docs/mathematics.md")]
+#[doc = concat!(
+    "\n<style>",
+    include_str!("../docs/katex/katex.min.css"),
+    "</style>\n\n<script>",
+    include_str!("../docs/katex/katex.min.js"),
+    "</script>\n\n<script>",
+    include_str!("../docs/katex/render.js"),
+    "</script>\n"
+)]
+pub mod mathematics {}
 
 pub use identify::{IdentifyError, Model, Options, identify};
