@@ -30,13 +30,26 @@ sed '1s/.*/t,"u<script>alert(1)<\/script>","u<img src=x onerror=alert(2)>","y<a 
 innovant identify "$folder/names.csv" --inputs 'u<script>alert(1)</script>,u<img src=x onerror=alert(2)>' \
     --outputs 'y<a href="javascript:alert(3)">z</a>,y&amp;<b>' --report "$folder/identify-names.html"
 
-for case in ${CASES:-001 004}; do
-    at=data/concealed/case_$case
-    simulation=$at/simulation.csv
-    [ -f "$simulation" ] || simulation=$at/simulation.json
-    innovant explain "$at/recording.csv" --simulation "$simulation" --report "$folder/explain-$case.html"
-done
+# One of each answer: effects with a simulation as columns and as a model, nothing missing, other parameters, and what
+# is left when the library lacks the truth.
+cases=data/concealed
+innovant explain $cases/case_001/recording.csv --simulation $cases/case_001/simulation.csv \
+    --report "$folder/explain-named.html"
+innovant explain $cases/case_004/recording.csv --simulation $cases/case_004/simulation.json \
+    --report "$folder/explain-freeze.html"
+innovant explain $cases/case_009/recording.csv --simulation $cases/case_009/simulation.json \
+    --report "$folder/explain-consistent.html"
+python3 - $cases/case_009/simulation.json "$folder/other_gain.json" <<'PYTHON'
+import json, sys
+model = json.load(open(sys.argv[1]))
+model["B"] = [[1.1 * value for value in row] for row in model["B"]]
+json.dump(model, open(sys.argv[2], "w"))
+PYTHON
+innovant explain $cases/case_009/recording.csv --simulation "$folder/other_gain.json" \
+    --report "$folder/explain-parameters.html"
+innovant explain $cases/case_006/recording.csv --simulation $cases/case_006/simulation.csv \
+    --without coulomb_friction,stribeck_friction,hysteresis --report "$folder/explain-unexplained.html"
 
-innovant reproduce ${EXPERIMENTS:-van-wingerden-1 chiuso-picci-1} --runs "${RUNS:-8}" --output-dir "$folder"
+innovant reproduce ${EXPERIMENTS:-van-wingerden-1 chiuso-picci-1 knudsen-vo} --runs "${RUNS:-8}" --output-dir "$folder"
 
 python3 tests/pages/check.py "$folder"/*.html ${1:+--pictures "$folder/pictures"}
