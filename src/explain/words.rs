@@ -147,23 +147,26 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
     }
     if let Some(heldout) = &e.fit.heldout {
         let f = |v: f64| format!("{v:.1} %");
-        lines.push(if matches!(e.verdict, Verdict::Consistent) {
-            format!(
-                "Fit of {} on blocks that were never fitted: {} (noise allows {}).",
-                e.fit.output,
+        // What was found is other parameters when the verdict says so, and nothing when it says consistent.
+        let steps = match e.verdict {
+            Verdict::Consistent => f(heldout.simulation.fit_percent),
+            Verdict::Parameters => format!(
+                "simulation {}, other parameters {}",
                 f(heldout.simulation.fit_percent),
-                f(heldout.noise_floor.fit_percent)
-            )
-        } else {
-            format!(
-                "Fit of {} on blocks that were never fitted: simulation {}, other parameters {}, with this {}; noise allows {}.",
-                e.fit.output,
+                f(heldout.augmented.fit_percent)
+            ),
+            Verdict::Named | Verdict::Family | Verdict::Unexplained => format!(
+                "simulation {}, other parameters {}, with this {}",
                 f(heldout.simulation.fit_percent),
                 f(heldout.parameters_only.fit_percent),
-                f(heldout.augmented.fit_percent),
-                f(heldout.noise_floor.fit_percent)
-            )
-        });
+                f(heldout.augmented.fit_percent)
+            ),
+        };
+        lines.push(format!(
+            "Fit of {} on blocks that were never fitted: {steps}; noise allows {}.",
+            e.fit.output,
+            f(heldout.noise_floor.fit_percent)
+        ));
     }
     if let (Verdict::Parameters, true) = (e.verdict, !e.parameters.is_empty()) {
         let changes: Vec<String> = e

@@ -84,13 +84,13 @@ pub(super) fn proof(of: &Explanation) -> Proof {
     ];
     let bounds: Vec<(&'static str, [f64; 2])> = sets
         .into_iter()
-        .filter_map(|(of, set)| {
+        .filter_map(|(samples, set)| {
             let set = set?;
             // Without a step from one to the other there is nothing to be sure of.
             let step = set.augmented != set.parameters_only;
             set.improvement_95
-                .filter(|_| step)
-                .map(|bounds| (of, bounds))
+                .filter(|_| step && goes_beyond_parameters(of.verdict))
+                .map(|bounds| (samples, bounds))
         })
         .collect();
     Proof {
@@ -171,20 +171,27 @@ fn intervals(bounds: &[(&'static str, [f64; 2])], unit: &str) -> Vec<Interval> {
         .collect()
 }
 
+/// Whether something was found that other parameters cannot do; gains are counted from these.
+fn goes_beyond_parameters(verdict: Verdict) -> bool {
+    !matches!(verdict, Verdict::Consistent | Verdict::Parameters)
+}
+
 fn sizes(of: &Explanation, unit: &str) -> Vec<(&'static str, String)> {
     let size = &of.effect_size;
     let mut sizes = vec![(
         "of the output’s variance is explained by the linear model",
         share(size.linear_share),
     )];
-    if !matches!(of.verdict, Verdict::Consistent | Verdict::Parameters) && size.removed_share > 0.0
-    {
+    if !goes_beyond_parameters(of.verdict) {
+        return sizes;
+    }
+    if size.removed_share > 0.0 {
         sizes.push((
             "of the variance that it leaves is removed by what was found",
             share(size.removed_share),
         ));
     }
-    if of.fit.heldout.is_some() && of.verdict != Verdict::Consistent && size.heldout_gain != 0.0 {
+    if of.fit.heldout.is_some() && size.heldout_gain != 0.0 {
         sizes.push((
             "smaller error (root mean square) on blocks that were never fitted",
             with_unit(&number(size.heldout_gain, 3), unit),
