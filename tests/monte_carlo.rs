@@ -3,96 +3,17 @@
 //!
 //! `cargo test --release --test monte_carlo -- --nocapture` prints the table.
 
-use innovant::covariance::{
-    Covariance2, ellipse_quantile, frequency_response_covariance, impulse_response_std,
-    interval_quantile, pole_uncertainties,
-};
+use innovant::covariance::impulse_response_std;
 use innovant::identify::{CovarianceKind, Order, Polish};
 use innovant::systems::{TestSystem, servo, van_wingerden_one};
-use innovant::{Model, Options, identify};
-use num_complex::Complex64;
+use innovant::{Options, identify};
 use rayon::prelude::*;
 
+#[path = "support/coverage.rs"]
+mod coverage;
+use coverage::{Count, coverage};
+
 const RUNS: u64 = 300;
-
-#[derive(Default, Clone, Copy)]
-struct Count {
-    inside_95: usize,
-    inside_99: usize,
-    total: usize,
-}
-
-impl Count {
-    fn ellipse(&mut self, error: Complex64, covariance: &Covariance2, freedom: Option<f64>) {
-        let [[a, b], [_, d]] = *covariance;
-        let determinant = a * d - b * b;
-        let square = (d * error.re * error.re - 2.0 * b * error.re * error.im
-            + a * error.im * error.im)
-            / determinant;
-        self.square(
-            square,
-            ellipse_quantile(0.95, freedom),
-            ellipse_quantile(0.99, freedom),
-        );
-    }
-
-    fn square(&mut self, square: f64, at_95: f64, at_99: f64) {
-        self.total += 1;
-        self.inside_95 += usize::from(square <= at_95);
-        self.inside_99 += usize::from(square <= at_99);
-    }
-
-    fn add(&mut self, other: &Count) {
-        self.inside_95 += other.inside_95;
-        self.inside_99 += other.inside_99;
-        self.total += other.total;
-    }
-
-    fn shares(&self) -> (f64, f64) {
-        let share = |inside: usize| 100.0 * inside as f64 / self.total as f64;
-        (share(self.inside_95), share(self.inside_99))
-    }
-}
-
-/// Frequency response (complex ellipse), its magnitude (on a logarithmic scale), poles.
-fn coverage(plant: &TestSystem, model: &Model, frequencies: &[f64]) -> [Count; 3] {
-    let covariance = model.covariance.as_ref().unwrap();
-    let freedom = covariance.degrees_of_freedom;
-    let mut counts = [Count::default(); 3];
-    for &w in frequencies {
-        let truth = plant.system.frequency_response(w);
-        let found = model.system.frequency_response(w);
-        let spread = frequency_response_covariance(&model.system, covariance, w).unwrap();
-        for (index, g) in found.iter().enumerate() {
-            let error = truth[index] - g;
-            counts[0].ellipse(error, &spread[index], freedom);
-            let [[a, b], [_, d]] = spread[index];
-            let (c, s) = (g.re / g.norm(), g.im / g.norm());
-            let variance = (a * c * c + 2.0 * b * c * s + d * s * s) / g.norm_sqr();
-            let square = (truth[index].norm() / g.norm()).ln().powi(2) / variance;
-            let limit = |level| interval_quantile(level, freedom).powi(2);
-            counts[1].square(square, limit(0.95), limit(0.99));
-        }
-    }
-    if model.system.states() != plant.system.states() {
-        // Poles of a model of another order have no true counterpart.
-        return counts;
-    }
-    let truth = plant.system.poles().unwrap();
-    for pole in pole_uncertainties(&model.system, covariance).unwrap() {
-        let value = pole.pole.value;
-        if value.im <= 1e-9 {
-            continue;
-        }
-        let nearest = truth
-            .iter()
-            .map(|p| p.value - value)
-            .min_by(|a, b| a.norm().total_cmp(&b.norm()))
-            .unwrap();
-        counts[2].ellipse(nearest, &pole.covariance.unwrap(), freedom);
-    }
-    counts
-}
 
 fn study(
     name: &str,

@@ -5,7 +5,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::error::IdentifyError;
 use super::method::{Decomposed, Estimated, Windows};
-use super::polish::{Effort, Polished, polish};
+use super::polish::{Effort, Polished, polish, reduced};
 use super::source::Source;
 use super::stable::with_stable_predictor;
 use super::truncation::{state_covariance, truncation};
@@ -52,12 +52,41 @@ impl Window {
         source: &mut Source<'_>,
     ) -> Result<Candidate, IdentifyError> {
         let estimate = decomposition.estimate(order, source)?;
-        let varx = &self.windows.varx;
         let polished = if self.polish {
-            polish(&estimate.system, varx, None, self.effort).ok()
+            polish(&estimate.system, &self.windows.varx, None, self.effort).ok()
         } else {
             None
         };
+        Ok(self.judged(estimate, polished))
+    }
+
+    /// `candidate` polished from another start, that of a larger model without the states that matter least, where that
+    /// ends lower.
+    pub fn reconsidered(&self, candidate: &Candidate, larger: &StateSpace) -> Option<Candidate> {
+        let start = reduced(larger, &self.windows.varx, candidate.order)?;
+        self.polished_from(&start, candidate)
+    }
+
+    /// `candidate` polished further, from where its polish ended.
+    pub fn continued(&self, candidate: &Candidate) -> Option<Candidate> {
+        self.polished_from(&candidate.polished.as_ref()?.system, candidate)
+    }
+
+    /// `candidate` polished from `start`, where that ends lower.
+    fn polished_from(&self, start: &StateSpace, candidate: &Candidate) -> Option<Candidate> {
+        let mut found = polish(start, &self.windows.varx, None, self.effort).ok()?;
+        if let Some(before) = &candidate.polished {
+            if found.cost > before.cost {
+                return None;
+            }
+            // What the polish gains, it gains over the estimate of the method.
+            found.start_cost = before.start_cost;
+        }
+        Some(self.judged(candidate.estimate.clone(), Some(found)))
+    }
+
+    fn judged(&self, estimate: Estimated, polished: Option<Polished>) -> Candidate {
+        let varx = &self.windows.varx;
         let innovation_covariance = &varx.innovation_covariance;
         let best = polished.as_ref().map_or(&estimate.system, |p| &p.system);
         let predictor =
@@ -71,14 +100,14 @@ impl Window {
             varx.columns,
         )
         .unwrap_or(f64::INFINITY);
-        Ok(Candidate {
-            order,
+        Candidate {
+            order: estimate.system.states(),
             estimate,
             polished,
             predictor,
             state_covariance,
             truncation,
-        })
+        }
     }
 }
 

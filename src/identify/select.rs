@@ -148,7 +148,7 @@ fn select_by(
         Order::Auto => choose_order(&mut evidence, varx, &mut estimator),
     };
     estimator.for_good(polish, proposal_only);
-    let candidate = estimator.candidate(order)?.clone();
+    let candidate = estimator.finished(order)?;
     if polish {
         note(&mut evidence, &candidate, varx);
     }
@@ -175,13 +175,12 @@ struct Estimator<'a, 'b> {
 }
 
 impl Estimator<'_, '_> {
-    /// From here on candidates are final: what the referee was content with is estimated again. A proposal is not
-    /// final, and a method that makes its own improvements waits with them.
+    /// From here on candidates are final. A proposal is not final, and a method that makes its own improvements waits
+    /// with them.
     fn for_good(&mut self, polish: bool, proposal_only: bool) {
         let own_numbers = self.options.method.polishes_itself();
-        let converged = |c: &Candidate| c.polished.as_ref().is_some_and(|p| p.converged);
         self.candidates
-            .retain(|c| polish && !own_numbers && converged(c));
+            .retain(|c| polish && !own_numbers && c.polished.is_some());
         self.window.polish = polish && !own_numbers;
         self.window.effort = Effort::Full;
         if own_numbers && !proposal_only {
@@ -190,6 +189,28 @@ impl Estimator<'_, '_> {
             self.window.windows.polish_by_method = polish;
             self.decompositions.clear();
         }
+    }
+
+    /// The candidate of the chosen order, polished to the end.
+    fn finished(&mut self, order: usize) -> Result<Candidate, IdentifyError> {
+        let candidate = self.candidate(order)?.clone();
+        let done = candidate.polished.as_ref().is_none_or(|p| p.converged);
+        Ok(if done {
+            candidate
+        } else {
+            self.window.continued(&candidate).unwrap_or(candidate)
+        })
+    }
+
+    /// Estimates an order once more, from the accepted model of the order above it. What a subspace method makes of
+    /// coloured inputs may be too poor a start, and then the order seems to be too low.
+    fn reconsider(&mut self, order: usize) -> Option<&Candidate> {
+        let at = |n: usize| self.candidates.iter().position(|c| c.order == n);
+        let (index, above) = (at(order)?, at(order + 1)?);
+        let larger = &self.candidates[above].polished.as_ref()?.system;
+        let found = self.window.reconsidered(&self.candidates[index], larger)?;
+        self.candidates[index] = found;
+        self.candidates.get(index)
     }
 
     fn future_for(&self, order: usize) -> usize {
@@ -325,7 +346,7 @@ fn choose_order(
 ) -> (usize, String) {
     let proposal = order::proposal(evidence).unwrap_or(1);
     let largest = evidence.len().max(1);
-    let mut test = |evidence: &mut Vec<OrderEvidence>, n: usize| {
+    let test = |evidence: &mut Vec<OrderEvidence>, estimator: &mut Estimator<'_, '_>, n: usize| {
         if let Ok(candidate) = estimator.candidate(n) {
             note(evidence, candidate, varx);
         }
@@ -338,10 +359,10 @@ fn choose_order(
     let accepts = |e: &OrderEvidence| e.p_value.is_none_or(|p| p >= order::REFEREE_LEVEL);
 
     let mut start = proposal;
-    test(evidence, start);
+    test(evidence, estimator, start);
     while start > 1 && find(evidence, start).is_none() {
         start -= 1;
-        test(evidence, start);
+        test(evidence, estimator, start);
     }
     let Some(mut best) = find(evidence, start) else {
         return (
@@ -351,10 +372,17 @@ fn choose_order(
     };
     if accepts(&best) {
         while best.order > 1 {
-            test(evidence, best.order - 1);
+            let order = best.order - 1;
+            test(evidence, estimator, order);
             // The test of the whole model may accept what a comparison with one state more would not.
-            match find(evidence, best.order - 1) {
-                Some(fewer) if accepts(&fewer) && fewer.schwarz <= best.schwarz => best = fewer,
+            let will_do = |e: &OrderEvidence| accepts(e) && e.schwarz <= best.schwarz;
+            if !find(evidence, order).is_some_and(|e| will_do(&e))
+                && let Some(candidate) = estimator.reconsider(order)
+            {
+                note(evidence, candidate, varx);
+            }
+            match find(evidence, order) {
+                Some(fewer) if will_do(&fewer) => best = fewer,
                 _ => break,
             }
         }
@@ -378,7 +406,7 @@ fn choose_order(
         (proposal + order::ORDERS_ABOVE).min(largest)
     };
     for order in start + 1..=last {
-        test(evidence, order);
+        test(evidence, estimator, order);
         if find(evidence, order).is_some_and(|e| accepts(&e)) {
             return (
                 order,

@@ -21,7 +21,6 @@ mod tests;
 use nalgebra::{DMatrix, DVector};
 
 use super::error::IdentifyError;
-use super::polish::TRIES;
 use crate::covariance::{ParameterCovariance, ParameterLayout};
 use crate::linalg::{
     LinalgError, all_finite, cholesky_upper, multiply_nt, multiply_tn, qr_r,
@@ -37,6 +36,18 @@ pub const STEPS: usize = 100;
 /// The search ends when a step promises less than this in the cost, in units of chi-square: the parameters are then
 /// within a thousandth of a standard deviation of the minimum.
 const DECREASE: f64 = 1e-6;
+/// Length and Levenberg-Marquardt damping (relative to the largest singular value) of the steps that are tried.
+const TRIES: [(f64, f64); 9] = [
+    (1.0, 0.0),
+    (0.5, 0.0),
+    (0.25, 0.0),
+    (1.0, 1e-5),
+    (1.0, 1e-4),
+    (1.0, 1e-3),
+    (1.0, 1e-2),
+    (1.0, 1e-1),
+    (1.0, 1.0),
+];
 /// Tried when none of [`TRIES`] leads down; of those the first that does is taken, for a cost here needs every sample.
 const LAST_TRY: (f64, f64) = (0.1, 1.0);
 /// Singular values of the Jacobian below this share of the largest are not determined by the data.

@@ -12,11 +12,14 @@
 //! Cramer-Rao bound. Indirect prediction-error method of Soderstrom, Stoica & Friedlander (1991) applied
 //! to the first step of PBSID.
 
+mod balanced;
 mod linearised;
 mod predictor;
 
 use nalgebra::DMatrix;
 
+use self::balanced::balanced;
+pub(super) use self::balanced::reduced;
 use self::linearised::{boundary_gradient, linearise};
 pub(super) use self::predictor::Problem;
 pub use self::predictor::predictor_coefficients;
@@ -31,20 +34,13 @@ use crate::model::StateSpace;
 const DECREASE: f64 = 1e-12;
 /// A Gauss-Newton iteration that has not ended by then will not.
 const ITERATIONS: usize = 60;
-/// Steps of which the one that decreases the cost most is taken: length of the step, and Levenberg-Marquardt
-/// damping relative to the largest singular value of the Jacobian. An order too high makes the Jacobian
-/// nearly singular, and only damping helps there.
-pub(super) const TRIES: [(f64, f64); 9] = [
-    (1.0, 0.0),
-    (0.5, 0.0),
-    (0.25, 0.0),
-    (1.0, 1e-5),
-    (1.0, 1e-4),
-    (1.0, 1e-3),
-    (1.0, 1e-2),
-    (1.0, 1e-1),
-    (1.0, 1.0),
-];
+/// Lengths of the Gauss-Newton step that are tried.
+const LENGTHS: [f64; 3] = [1.0, 0.5, 0.25];
+/// Levenberg-Marquardt dampings that are tried, relative to the largest singular value of the Jacobian, as powers of
+/// ten: `(from, to, steps a decade)`. An order too high, or an input that hardly excites some direction, makes the
+/// Jacobian nearly singular, and only damping of the size of the singular values in question helps there. Where that is
+/// a large share of them, a decade is too coarse: along a curved valley the longest step that still leads down counts.
+const DAMPINGS: [(i32, i32, i32); 2] = [(-10, -6, 1), (-5, 0, 4)];
 /// Steps in a row that each gain less than [`GAIN`] end the iteration: a flat valley, where the cost, and
 /// with it every prediction, no longer changes.
 const FLAT_STEPS: usize = 3;
@@ -115,6 +111,7 @@ pub fn polish(
     let hopeless = HOPELESS * degrees_of_freedom as f64;
     let mut converged = false;
     let covariance = loop {
+        system = balanced(&system, varx.past);
         let jacobian = problem.jacobian(&system);
         if !all_finite(&jacobian) {
             return Err(LinalgError::NotFinite {
@@ -137,9 +134,8 @@ pub fn polish(
         iterations += 1;
         let theta = layout.pack(&system);
         // A cost is cheap beside a Jacobian: try all, take the best.
-        let better = TRIES
-            .iter()
-            .filter_map(|&(length, damping)| {
+        let better = tries()
+            .filter_map(|(length, damping)| {
                 let moved: Vec<f64> = theta
                     .iter()
                     .zip(linearised.step(damping).iter())
@@ -191,6 +187,18 @@ pub fn polish(
         iterations,
         converged,
     })
+}
+
+/// Length and damping of the steps of which the one that decreases the cost most is taken.
+fn tries() -> impl Iterator<Item = (f64, f64)> {
+    let damped = DAMPINGS.into_iter().flat_map(|(from, to, steps)| {
+        (from * steps..=to * steps)
+            .map(move |power| 10f64.powf(f64::from(power) / f64::from(steps)))
+    });
+    LENGTHS
+        .into_iter()
+        .map(|length| (length, 0.0))
+        .chain(damped.map(|damping| (1.0, damping)))
 }
 
 /// Cost of a system against the vector ARX estimate (chi-square units), infinite when its predictor

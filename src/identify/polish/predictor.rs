@@ -13,12 +13,12 @@ pub struct Problem<'a> {
     layout: ParameterLayout,
     /// Inverse of the lower Cholesky factor of Lambda.
     whitener: DMatrix<f64>,
-    /// `L^-1 Ry'`, `l x m`.
+    /// `Ry L^-T`, `m x l`.
     target: DMatrix<f64>,
 }
 
 /// `C At^i`, `i = 0 .. p-1`.
-fn observability(system: &StateSpace, past: usize) -> Vec<DMatrix<f64>> {
+pub fn observability(system: &StateSpace, past: usize) -> Vec<DMatrix<f64>> {
     let predictor = system.predictor_matrix();
     let next = |row: &DMatrix<f64>| Some(row * &predictor);
     std::iter::successors(Some(system.c.clone()), next)
@@ -27,7 +27,7 @@ fn observability(system: &StateSpace, past: usize) -> Vec<DMatrix<f64>> {
 }
 
 /// `At^i [B~ K]`, `i = 0 .. p-1`.
-fn controllability(system: &StateSpace, past: usize) -> Vec<DMatrix<f64>> {
+pub fn controllability(system: &StateSpace, past: usize) -> Vec<DMatrix<f64>> {
     let predictor = system.predictor_matrix();
     let mut input = DMatrix::zeros(system.states(), system.inputs() + system.outputs());
     input
@@ -85,18 +85,18 @@ impl<'a> Problem<'a> {
         let identity = DMatrix::identity(layout.outputs, layout.outputs);
         let whitener = solve_upper_transposed(&upper, &identity);
         Ok(Self {
-            target: multiply_nt(&whitener, &varx.output_factor),
+            target: multiply_nt(&varx.output_factor, &whitener),
             varx,
             layout,
             whitener,
         })
     }
 
-    /// Whitened difference between the estimated predictions and those of a system, `l x m`.
+    /// Whitened difference between the estimated predictions and those of a system, one column an output (`m x l`).
     pub fn residual(&self, system: &StateSpace) -> DMatrix<f64> {
         let coefficients = predictor_coefficients(system, self.varx.past, self.layout.feedthrough);
-        let model = multiply_nt(&coefficients, &self.varx.regressor_factor);
-        &self.target - multiply(&self.whitener, &model)
+        let whitened = multiply(&self.whitener, &coefficients);
+        &self.target - multiply_nt(&self.varx.regressor_factor, &whitened)
     }
 
     /// Sum of squares of the residual, in units of chi-square; infinite when it overflows.
@@ -110,8 +110,11 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Derivative of the whitened predictions `L^-1 Xi Rz'` with respect to each parameter, one column
-    /// a parameter.
+    /// Derivative of the whitened predictions `Rz Xi' L^-T` with respect to each parameter, one column a parameter, the
+    /// outputs one below the other.
+    ///
+    /// All of it are combinations of three products with `Rz`, of which the first is nearly all the work: the
+    /// derivatives with respect to the predictor matrix `At`, to what enters the state, and to what leaves it.
     pub fn jacobian(&self, system: &StateSpace) -> DMatrix<f64> {
         let ParameterLayout {
             states: n,
@@ -121,130 +124,124 @@ impl<'a> Problem<'a> {
         } = self.layout;
         let q = inputs + outputs;
         let past = self.varx.past;
-        let regressors = self.varx.regressors();
-        let observability = observability(system, past);
+        let factor = self.factor_by_channel(q);
+        let rows = factor.nrows();
+        let observability: Vec<DMatrix<f64>> = observability(system, past)
+            .iter()
+            .map(|row| &self.whitener * row)
+            .collect();
         let controllability = controllability(system, past);
-        let parameters = self.layout.len();
 
-        // d C At^i [B~ K] / d At[a, b] = sum_{s+t=i-1} (C At^s)[:, a] (At^t [B~ K])[b, :], kept for all lags:
-        // entry (o, j) of lag i at ((j * outputs + o) * past + i), one column an (a, b). Each is a convolution of two
-        // series over the lags, written so that the inner loop runs along memory: this is most of the work.
-        let row_series = series(&observability);
-        let column_series = series(&controllability);
-        let mut of_predictor = DMatrix::<f64>::zeros(past * q * outputs, n * n);
-        for b in 0..n {
-            for a in 0..n {
-                let mut column = of_predictor.column_mut(a + n * b);
-                let mut lags = column.as_mut_slice().chunks_exact_mut(past);
-                for j in 0..q {
-                    for o in 0..outputs {
-                        if let Some(out) = lags.next() {
-                            let row = &row_series[(o + outputs * a) * past..][..past];
-                            let input = &column_series[(b + n * j) * past..][..past];
-                            add_convolution(out, row, input);
-                        }
-                    }
-                }
+        // Blocks of `outputs` columns, which are one column of the result each.
+        let block = rows * outputs;
+        let of_predictor = multiply(
+            &factor,
+            &predictor_derivative(&observability, &controllability),
+        );
+        let of_predictor = of_predictor.as_slice();
+        let entering = DMatrix::from_fn(past, n * outputs, |lag, column| {
+            observability[lag][(column % outputs, column / outputs)]
+        });
+        let entering: Vec<DMatrix<f64>> = (0..q)
+            .map(|j| multiply(&factor.columns(j * past, past).into_owned(), &entering))
+            .collect();
+        let leaving = DMatrix::from_fn(past * q, n, |row, b| {
+            controllability[row % past][(b, row / past)]
+        });
+        let leaving = multiply(&factor, &leaving);
+
+        let mut out = DMatrix::zeros(block, self.layout.len());
+        let columns = out.as_mut_slice();
+        let add = |to: &mut [f64], weight: f64, from: &[f64]| {
+            for (to, value) in to.iter_mut().zip(from) {
+                *to += weight * value;
             }
-        }
-        // One column a parameter and output: regressors x (parameter * outputs + o).
-        let mut derivative = DMatrix::<f64>::zeros(regressors, parameters * outputs);
-        let column_of = |lag: usize, j: usize| (past - 1 - lag) * q + j;
-        let add_predictor =
-            |derivative: &mut DMatrix<f64>, parameter: usize, ab: usize, factor: f64| {
-                if factor == 0.0 {
-                    return;
-                }
-                let column = of_predictor.column(ab);
-                let mut lags = column.as_slice().chunks_exact(past);
-                for j in 0..q {
-                    for o in 0..outputs {
-                        let mut to = derivative.column_mut(parameter * outputs + o);
-                        for (lag, value) in lags.next().unwrap_or(&[]).iter().enumerate() {
-                            to[column_of(lag, j)] += factor * value;
-                        }
-                    }
-                }
-            };
-        // A
-        for ab in 0..n * n {
-            add_predictor(&mut derivative, ab, ab, 1.0);
-        }
+        };
+        columns[..n * n * block].copy_from_slice(of_predictor);
         // B: through B~ only.
-        for j in 0..inputs {
-            for a in 0..n {
-                let parameter = self.layout.b() + a + n * j;
-                for (lag, row) in observability.iter().enumerate() {
-                    for o in 0..outputs {
-                        derivative[(column_of(lag, j), parameter * outputs + o)] += row[(o, a)];
-                    }
+        for (j, direct) in entering[..inputs].iter().enumerate() {
+            columns[(self.layout.b() + n * j) * block..][..n * block]
+                .copy_from_slice(direct.as_slice());
+        }
+        // K: an input matrix itself; B~ loses K D, At loses K C.
+        for v in 0..outputs {
+            let to = &mut columns[(self.layout.k() + n * v) * block..][..n * block];
+            to.copy_from_slice(entering[inputs + v].as_slice());
+            for (j, direct) in entering[..inputs].iter().enumerate() {
+                if system.d[(v, j)] != 0.0 {
+                    add(to, -system.d[(v, j)], direct.as_slice());
                 }
             }
-        }
-        // K: At loses K C, B~ loses K D, and K is an input matrix itself.
-        for v in 0..outputs {
-            for a in 0..n {
-                let parameter = self.layout.k() + a + n * v;
-                for b in 0..n {
-                    add_predictor(&mut derivative, parameter, a + n * b, -system.c[(v, b)]);
-                }
-                for (lag, row) in observability.iter().enumerate() {
-                    for o in 0..outputs {
-                        derivative[(column_of(lag, inputs + v), parameter * outputs + o)] +=
-                            row[(o, a)];
-                        for j in 0..inputs {
-                            derivative[(column_of(lag, j), parameter * outputs + o)] -=
-                                row[(o, a)] * system.d[(v, j)];
-                        }
-                    }
-                }
+            for b in 0..n {
+                add(to, -system.c[(v, b)], &of_predictor[n * b * block..]);
             }
         }
         // C: the output row, and At loses K C.
         for b in 0..n {
             for v in 0..outputs {
-                let parameter = self.layout.c() + v + outputs * b;
-                for a in 0..n {
-                    add_predictor(&mut derivative, parameter, a + n * b, -system.k[(a, v)]);
+                let to = &mut columns[(self.layout.c() + v + outputs * b) * block..][..block];
+                for (o, to) in to.chunks_exact_mut(rows).enumerate() {
+                    add(to, self.whitener[(o, v)], leaving.column(b).as_slice());
                 }
-                for (lag, input) in controllability.iter().enumerate() {
-                    for j in 0..q {
-                        derivative[(column_of(lag, j), parameter * outputs + v)] += input[(b, j)];
-                    }
+                for a in 0..n {
+                    add(to, -system.k[(a, v)], &of_predictor[(a + n * b) * block..]);
                 }
             }
         }
         // D: directly, and B~ loses K D.
         if feedthrough {
-            for j in 0..inputs {
+            for (j, direct) in entering[..inputs].iter().enumerate() {
+                let same_sample = self.varx.regressor_factor.column(past * q + j);
                 for v in 0..outputs {
-                    let parameter = self.layout.d() + v + outputs * j;
-                    for (lag, row) in observability.iter().enumerate() {
-                        for o in 0..outputs {
-                            let value: f64 = (0..n).map(|a| row[(o, a)] * system.k[(a, v)]).sum();
-                            derivative[(column_of(lag, j), parameter * outputs + o)] -= value;
-                        }
+                    let to = &mut columns[(self.layout.d() + v + outputs * j) * block..][..block];
+                    for (o, to) in to.chunks_exact_mut(rows).enumerate() {
+                        add(to, self.whitener[(o, v)], same_sample.as_slice());
                     }
-                    derivative[(past * q + j, parameter * outputs + v)] += 1.0;
-                }
-            }
-        }
-
-        let weighted = multiply(&self.varx.regressor_factor, &derivative);
-        let mut out = DMatrix::zeros(outputs * regressors, parameters);
-        for parameter in 0..parameters {
-            for o in 0..outputs {
-                for v in 0..=o {
-                    let from = weighted.column(parameter * outputs + v);
-                    let whitener = self.whitener[(o, v)];
-                    for (j, value) in from.iter().enumerate() {
-                        out[(o + outputs * j, parameter)] += whitener * value;
+                    for a in 0..n {
+                        add(to, -system.k[(a, v)], &direct.as_slice()[a * block..]);
                     }
                 }
             }
         }
         out
     }
+
+    /// The columns of `Rz` that belong to the past window, channel by channel and the newest sample first: series over
+    /// the lags then run along memory.
+    fn factor_by_channel(&self, q: usize) -> DMatrix<f64> {
+        let past = self.varx.past;
+        let factor = &self.varx.regressor_factor;
+        let columns: Vec<usize> = (0..q)
+            .flat_map(|j| (0..past).map(move |lag| (past - 1 - lag) * q + j))
+            .collect();
+        factor.select_columns(&columns)
+    }
+}
+
+/// `d C At^i [B~ K] / d At[a, b] = sum_{s+t=i-1} (C At^s)[:, a] (At^t [B~ K])[b, :]` for all lags `i`: entry `(o, j)` of
+/// lag `i` in row `j p + i`, one column an `(a, b)` and `o`. Each is a convolution of two series over the lags.
+fn predictor_derivative(
+    observability: &[DMatrix<f64>],
+    controllability: &[DMatrix<f64>],
+) -> DMatrix<f64> {
+    let past = observability.len();
+    let (outputs, n) = observability.first().map_or((0, 0), DMatrix::shape);
+    let q = controllability.first().map_or(0, DMatrix::ncols);
+    let rows = series(observability);
+    let columns = series(controllability);
+    let mut out = DMatrix::<f64>::zeros(past * q, n * n * outputs);
+    for b in 0..n {
+        for a in 0..n {
+            for o in 0..outputs {
+                let row = &rows[(o + outputs * a) * past..][..past];
+                let mut column = out.column_mut((a + n * b) * outputs + o);
+                for (j, lags) in column.as_mut_slice().chunks_exact_mut(past).enumerate() {
+                    add_convolution(lags, row, &columns[(b + n * j) * past..][..past]);
+                }
+            }
+        }
+    }
+    out
 }
 
 #[cfg(test)]
