@@ -3,7 +3,7 @@
 use super::adequacy::{Adequacy, adequacy};
 use super::data::Data;
 use super::effects::{self, Definition, Unit};
-use super::exact::{Freeze, frozen, spacing};
+use super::exact::{Freeze, frozen};
 use super::explanation::Verdict;
 use super::fit::{Effort, Fit, Problem};
 use super::plausible::{add_free_twins, plant_may_stay, pulls, reaches, sane};
@@ -11,6 +11,7 @@ use super::refine::{FURTHER, REFINEMENTS, decides_within, derived, finer_steps};
 use super::search::{Boring, Ranked, single_effects};
 use super::second::{self, heldout_gain, pair, with_feedthrough};
 use super::structure::Structure;
+use crate::log::spacing;
 
 /// Places, laws and starting values that are tried on one recording, about: a name among so many needs
 /// `2 ln(300)` more than nothing at all (the maximum of that many chi-squares with one degree of freedom).

@@ -7,6 +7,7 @@ use super::fit::Fit;
 use super::method::{Estimated, Method};
 use super::options::{CovarianceKind, Options, Order, Polish};
 use super::polish::{Effort, Polished, coefficient_cost, polish};
+use super::resolution::{Stepped, coarse};
 use super::scaling;
 use super::select::{Selection, Windowed};
 use super::source::Source;
@@ -17,7 +18,9 @@ use super::summary::{
 use super::truncation::LARGEST_FOR_POLISH;
 use super::varx::{Varx, varx};
 use super::warnings;
-use crate::covariance::{ParameterCovariance, ParameterLayout, jackknife_covariance};
+use crate::covariance::{
+    ParameterCovariance, ParameterLayout, jackknife_covariance, pole_uncertainties,
+};
 use crate::linalg::spectral_radius;
 use crate::model::StateSpace;
 
@@ -36,6 +39,10 @@ pub struct Chosen {
     pub selection: Selection,
     /// Evidence on the past windows.
     pub past_windows: Vec<PastEvidence>,
+    /// Channels that were recorded in steps.
+    pub stepped: Vec<Stepped>,
+    /// Longest past window that the recording allowed, where it was the choice.
+    pub past_limited_to: Option<usize>,
     /// How it was decided.
     pub explanation: Vec<String>,
 }
@@ -54,6 +61,8 @@ pub fn finish(
         windowed,
         selection,
         past_windows,
+        stepped,
+        past_limited_to,
         mut explanation,
     } = chosen;
     let Windowed { factor, varx } = windowed;
@@ -171,6 +180,17 @@ pub fn finish(
         })?
     };
 
+    let (of_inputs, of_outputs): (Vec<_>, Vec<_>) = stepped
+        .into_iter()
+        .partition(|channel| channel.index < factor.inputs);
+    let (coarse_inputs, coarse_outputs) = if noise_free {
+        (Vec::new(), Vec::new())
+    } else {
+        (
+            coarse(&of_inputs, &varx, &data.scale)?,
+            coarse(&of_outputs, &varx, &data.scale)?,
+        )
+    };
     let mut summary = Summary {
         method: options.method,
         stochastic: options.stochastic,
@@ -210,6 +230,9 @@ pub fn finish(
             order_test,
             orders: evidence,
             past_windows,
+            past_limited_to,
+            coarse_inputs,
+            coarse_outputs,
             stability,
             jackknife_blocks,
         },
@@ -223,6 +246,8 @@ pub fn finish(
     if predictor_mirrored && !noise_free {
         summary.warnings.push(warnings::predictor_mirrored());
     }
+    let poles = pole_uncertainties(&system, &covariance).unwrap_or_default();
+    summary.warnings.extend(warnings::of_poles(&poles));
     Ok(Fit {
         system: scaling::system_in_user_units(&system, &data.scale),
         covariance: scaling::covariance_in_user_units(&covariance, &data.scale),

@@ -11,6 +11,7 @@ use super::free_run::low_order;
 use super::horizon;
 use super::options::{Options, Order};
 use super::records::Records;
+use super::resolution::stepped;
 use super::select::{Windowed, propose, select};
 use super::source::Source;
 use super::summary::{PastEvidence, Summary};
@@ -60,10 +61,19 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
     let longest = longest.min(data.lags());
 
     let mut explanation = Vec::new();
-    let (past, past_windows) = match options.past {
-        Some(past) => (past, Vec::new()),
+    let ChosenPast {
+        past,
+        evidence: past_windows,
+        limited_to: past_limited_to,
+    } = match options.past {
+        Some(past) => ChosenPast {
+            past,
+            evidence: Vec::new(),
+            limited_to: None,
+        },
         None => choose_past(&data, records, options, longest, &mut explanation)?,
     };
+    let stepped = stepped(records)?;
     let mut source = Source::new(&data, records);
     let mut chosen = windowed(&mut source, past, options)?;
     // A plant that is not linear, recorded with little noise, has no linear order: its free run decides.
@@ -135,6 +145,8 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
             windowed: chosen,
             selection,
             past_windows,
+            stepped,
+            past_limited_to,
             explanation,
         },
     )
@@ -240,13 +252,21 @@ fn windowed(
     Ok(Windowed { factor, varx })
 }
 
+/// The past window that Akaike's criterion leads to.
+struct ChosenPast {
+    past: usize,
+    evidence: Vec<PastEvidence>,
+    /// The limit, where it was the choice and the length of the recording set it.
+    limited_to: Option<usize>,
+}
+
 fn choose_past(
     data: &Data,
     records: &mut dyn Records,
     options: &Options,
     longest: usize,
     explanation: &mut Vec<String>,
-) -> Result<(usize, Vec<PastEvidence>), IdentifyError> {
+) -> Result<ChosenPast, IdentifyError> {
     let q = data.channels();
     let outputs = records.outputs().len();
     let limit = horizon::longest_past(data.samples, q, horizon::LONGEST_PAST.min(longest));
@@ -310,5 +330,10 @@ fn choose_past(
         .filter(|(_, akaike)| akaike.is_finite())
         .map(|(past, akaike)| PastEvidence { past, akaike })
         .collect();
-    Ok((past, evidence))
+    let by_length = limit < horizon::LONGEST_PAST.min(longest);
+    Ok(ChosenPast {
+        past,
+        evidence,
+        limited_to: (by_length && best == limit).then_some(limit),
+    })
 }

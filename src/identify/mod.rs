@@ -21,6 +21,7 @@
 //! | `truncation` | what the past window cuts off | |
 //! | `polish` | the maximum-likelihood model of that order | Soderstrom, Stoica & Friedlander 1991 |
 //! | `stable` | a stable model, guaranteed | |
+//! | `resolution` | what the steps of a recording do to the estimate | |
 //! | `finish`, `scaling`, `warnings` | covariance, the user's units, what to know before trusting it | |
 //! | `model`, `simulate`, `summary` | the result | |
 //!
@@ -47,6 +48,7 @@ pub mod pem;
 mod polish;
 mod records;
 mod reduced;
+mod resolution;
 mod scaling;
 mod select;
 mod simulate;
@@ -73,6 +75,7 @@ pub use pbsid_opt::{Decomposition, Estimate, Weight, decompose, system_matrices}
 pub use polish::{Effort, Polished, coefficient_cost, polish, predictor_coefficients};
 pub use records::{FileRecords, MemoryRecords, ReadProgress, Recording, Records};
 pub use reduced::{ReducedRecords, SAMPLES_KEPT};
+pub use resolution::CoarseChannel;
 pub use source::Source;
 pub use stochastic::Stochastic;
 pub use summary::{Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary};

@@ -6,6 +6,7 @@ use super::method::Method;
 use super::options::{CovarianceKind, Polish};
 use super::order::OrderEvidence;
 use super::pbsid_opt::Weight;
+use super::resolution::CoarseChannel;
 use super::stochastic::Stochastic;
 use crate::moments::{Detrend, Route};
 
@@ -99,6 +100,16 @@ pub struct Diagnostics {
     /// Evidence on the past windows.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub past_windows: Vec<PastEvidence>,
+    /// Longest past window that was tried, where the length of the recording was the limit and Akaike's choice was the
+    /// limit itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub past_limited_to: Option<usize>,
+    /// Channels that were recorded in steps, where that may matter.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub coarse_inputs: Vec<CoarseChannel>,
+    /// Likewise outputs: they only matter when a controller acted on what was not rounded.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub coarse_outputs: Vec<CoarseChannel>,
     /// What `--stable` cost.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stability: Option<StabilityCost>,

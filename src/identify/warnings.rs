@@ -3,9 +3,11 @@
 use super::method::Method;
 use super::options::{Options, Polish};
 use super::order::REFEREE_LEVEL;
+use super::resolution::{CoarseChannel, WORTH_A_WARNING};
 use super::summary::Summary;
 use super::truncation::LARGEST_FOR_POLISH;
 use super::varx::Varx;
+use crate::covariance::{PoleUncertainty, projected_variance};
 use crate::moments::Route;
 
 /// Truncation that PBSID_opt itself no longer tolerates.
@@ -15,6 +17,8 @@ const LARGEST_FOR_SUBSPACE: f64 = 100.0;
 const SAMPLES_PER_REGRESSOR: f64 = 5.0;
 /// Reciprocal condition below which some combination of past signals is hardly excited.
 const POOR_EXCITATION: f64 = 1e-6;
+/// Standard deviations from the unit circle within which a pole may as well lie on it: one-sided, 2.3 %.
+const CLOSE_TO_THE_CIRCLE: f64 = 2.0;
 
 /// Warnings that follow from the fit alone.
 pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Options) -> Vec<String> {
@@ -97,6 +101,17 @@ pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Option
             summary.diagnostics.reciprocal_condition
         ));
     }
+    if let Some(past) = summary.diagnostics.past_limited_to {
+        out.push(format!(
+            "short recording: {} samples allow a past window of {past} at most, and that is what Akaike's criterion \
+             chose; a model of a higher order, or slower noise, would not have been seen",
+            summary.samples
+        ));
+    }
+    out.extend(of_rounding(
+        &summary.diagnostics.coarse_inputs,
+        "if it was measured so, and not commanded",
+    ));
     if let Some(stability) = &summary.diagnostics.stability {
         out.push(match stability.p_value {
             Some(p) if p < REFEREE_LEVEL => format!(
@@ -110,6 +125,48 @@ pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Option
         });
     }
     out
+}
+
+/// Warnings about poles that may as well lie on the unit circle.
+pub fn of_poles(poles: &[PoleUncertainty]) -> Vec<String> {
+    poles
+        .iter()
+        .filter(|p| p.pole.value.im >= 0.0)
+        .filter_map(|p| {
+            let radius = p.pole.value.norm();
+            let (c, s) = (p.pole.value.re / radius, p.pole.value.im / radius);
+            let deviation = projected_variance(&p.covariance?, c, s).sqrt();
+            let distance = 1.0 - radius;
+            // An unstable pole is told of by the spectral radius.
+            (distance > 0.0 && distance < CLOSE_TO_THE_CIRCLE * deviation).then(|| {
+                let what = if p.pole.value.im > 0.0 {
+                    "an undamped resonance"
+                } else {
+                    "an integrator"
+                };
+                format!(
+                    "a pole with |z| = {radius:.6} +- {deviation:.6} cannot be told from {what}: its time constant, the \
+                     gain it makes and a free run over long times are not known, and near its frequency bands are too \
+                     narrow; a longer recording would settle it"
+                )
+            })
+        })
+        .collect()
+}
+
+/// What rounding does, when it does more than the stated uncertainty says.
+fn of_rounding(channels: &[CoarseChannel], condition: &str) -> Vec<String> {
+    channels
+        .iter()
+        .filter(|channel| channel.bias > WORTH_A_WARNING)
+        .map(|channel| {
+            format!(
+                "{} was recorded in steps of {}: {condition}, this biases the model by up to {:.0} standard deviations, \
+                 which its uncertainty does not say; record it with a finer resolution",
+                channel.channel, channel.step, channel.bias
+            )
+        })
+        .collect()
 }
 
 /// Warnings that follow when the residual tests find that the recordings were taken in closed loop.
@@ -132,6 +189,10 @@ pub fn of_closed_loop(summary: &Summary) -> Vec<String> {
             step.name()
         ));
     }
+    out.extend(of_rounding(
+        &summary.diagnostics.coarse_outputs,
+        "if the controller acted on what was not rounded",
+    ));
     if summary.options.feedthrough {
         out.push(
             "the recording was taken in closed loop: D is only right when the controller acts with a delay; leave out \

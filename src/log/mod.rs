@@ -15,6 +15,7 @@
 //! | `sampling`    | is the time base uniform, and what is its step                  |
 //! | `reader`      | the five above, put together as a stream of blocks              |
 //! | `record`      | a whole record in memory                                        |
+//! | `lattice`     | was a signal recorded in steps                                  |
 //! | `writer`      | columns to CSV; `atomic`: a file appears whole or not at all    |
 //!
 //! # What is accepted
@@ -40,6 +41,7 @@ mod channel;
 mod decimal;
 mod error;
 mod header;
+mod lattice;
 mod lines;
 mod parse;
 mod reader;
@@ -55,6 +57,7 @@ mod writer;
 pub use atomic::write_file_atomically;
 pub use channel::Channel;
 pub use error::LogError;
+pub use lattice::spacing;
 pub use reader::{
     BLOCK_ROWS, Block, LogReader, LogSummary, check_same_channels, check_same_sampling,
 };
