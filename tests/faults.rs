@@ -88,7 +88,8 @@ fn killed(
     let place = folder.join("out");
     fs::create_dir_all(&place).unwrap();
     let path = place.join(output);
-    let whole = [arguments, &[&format!("out/{output}")[..]]].concat();
+    let named = format!("out/{output}");
+    let whole = [arguments, &[named.as_str()]].concat();
     let started = Instant::now();
     assert!(innovant(folder, &whole).status().unwrap().success());
     let duration = started.elapsed();

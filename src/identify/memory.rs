@@ -7,7 +7,9 @@
 //!   correlations a block of the jackknife;
 //! - the Gram matrix and its factors are `m x m` ([`FACTORS`] of them at the peak);
 //! - the derivative of the predictor with respect to the parameters is `l p q x P`, and the regression on it holds
-//!   [`DERIVATIVES`] of that size, with one `l p q x n^2` beside them.
+//!   [`DERIVATIVES`] of that size, with one `l p q x n^2` beside them;
+//! - the residual tests, which come after the fit, average the sensitivity of the residuals to the parameters
+//!   (`validate::sensitivity`).
 //!
 //! The counts are measured ones; `tests/limits.rs` holds the sum against peaks.
 
@@ -17,6 +19,7 @@ use super::options::Options;
 use crate::limits::{self, of_numbers};
 use crate::log::BLOCK_ROWS;
 use crate::moments::LagAccumulator;
+use crate::validate::numbers_of_tests;
 
 /// What the program takes for nothing: code, buffers, what is kept of small recordings.
 const BASE: u64 = 12 << 20;
@@ -73,10 +76,17 @@ impl Sizes {
                 let parameters = squares
                     .saturating_add(n.saturating_mul(r))
                     .saturating_add(n.saturating_mul(l).saturating_mul(2));
-                bytes = bytes
-                    .saturating_add(of_numbers(&[DERIVATIVES, coefficients, parameters]))
+                let fit = of_numbers(&[DERIVATIVES, coefficients, parameters])
                     .saturating_add(of_numbers(&[coefficients, squares]))
                     .saturating_add(of_numbers(&[DERIVATIVES, parameters, parameters]));
+                // The residual tests come when the fit is done.
+                let directions = if options.may_polish() {
+                    parameters - squares
+                } else {
+                    parameters
+                };
+                let tests = of_numbers(&[numbers_of_tests(r, l, directions)]);
+                bytes = bytes.saturating_add(fit.max(tests));
             }
         }
         bytes
