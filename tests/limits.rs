@@ -108,6 +108,12 @@ fn recordings_that_do_not_fit_are_refused_as_they_are_read() {
             "{message}"
         );
     }
+    let message = refused(&folder, &["show", "model.json", "--memory-limit", "10k"]);
+    assert!(
+        message.starts_with("model.json: reading a document of ")
+            && message.contains("give a model of a lower order"),
+        "{message}"
+    );
     let message = refused(
         &folder,
         &[
