@@ -48,6 +48,7 @@
 //! | [`batch`] | many logs, a model of each: parallel, resumable |
 //! | [`report`] | JSON documents with their schema, tables for people |
 //! | [`reproduce`] | the papers' experiments, run again, beside what the papers print |
+//! | [`limits`] | how much memory a request may take |
 //! | [`cli`] | the command line |
 //! | [`linalg`] | the only place that names faer |
 //! | [`systems`] | the papers' examples, simulated, for tests and benchmarks |
@@ -67,6 +68,7 @@ pub mod cli;
 pub mod covariance;
 pub mod explain;
 pub mod identify;
+pub mod limits;
 pub mod linalg;
 pub mod log;
 pub mod model;

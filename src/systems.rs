@@ -43,24 +43,12 @@ impl TestSystem {
         &self,
         samples: usize,
         seed: u64,
-        mut shape: impl FnMut(usize, usize, f64) -> f64,
+        shape: impl FnMut(usize, usize, f64) -> f64,
     ) -> Log {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let system = &self.system;
-        let (r, l) = (system.inputs(), system.outputs());
-        let noise = crate::linalg::symmetric_square_root_factor(&self.innovation_covariance)
-            .unwrap_or_else(|_| DMatrix::zeros(l, l));
-        let mut x = DVector::zeros(system.states());
+        let (r, l) = (self.system.inputs(), self.system.outputs());
         let mut input_data = vec![Vec::with_capacity(samples); r];
         let mut output_data = vec![Vec::with_capacity(samples); l];
-        for k in 0..samples {
-            let reference = DVector::from_fn(r, |i, _| shape(k, i, normal()));
-            let e = &noise * DVector::from_fn(l, |_, _| normal());
-            let without_feedthrough = &system.c * &x + &e;
-            let u = &self.feedback * &without_feedthrough + reference;
-            let y = without_feedthrough + &system.d * &u;
-            x = &system.a * x + &system.b * &u + &system.k * e;
+        for (u, y) in self.samples_with(seed, shape).take(samples) {
             for (column, value) in input_data.iter_mut().zip(u.iter()) {
                 column.push(*value);
             }
@@ -70,7 +58,7 @@ impl TestSystem {
         }
         Log {
             name: format!("seed {seed}"),
-            sample_time: system.sample_time,
+            sample_time: self.system.sample_time,
             start_time: 0.0,
             inputs: channels('u', r),
             outputs: channels('y', l),
@@ -79,10 +67,65 @@ impl TestSystem {
             sha256: None,
         }
     }
+
+    /// The samples `(u[k], y[k])` of [`TestSystem::record`], one after the other and without end.
+    pub fn samples(&self, seed: u64) -> impl Iterator<Item = (DVector<f64>, DVector<f64>)> {
+        self.samples_with(seed, |_, _, white| white)
+    }
+
+    fn samples_with(
+        &self,
+        seed: u64,
+        mut shape: impl FnMut(usize, usize, f64) -> f64,
+    ) -> impl Iterator<Item = (DVector<f64>, DVector<f64>)> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = move || -> f64 { StandardNormal.sample(&mut random) };
+        let system = &self.system;
+        let (r, l) = (system.inputs(), system.outputs());
+        let noise = crate::linalg::symmetric_square_root_factor(&self.innovation_covariance)
+            .unwrap_or_else(|_| DMatrix::zeros(l, l));
+        let mut x = DVector::zeros(system.states());
+        (0..).map(move |k| {
+            let reference = DVector::from_fn(r, |i, _| shape(k, i, normal()));
+            let e = &noise * DVector::from_fn(l, |_, _| normal());
+            let without_feedthrough = &system.c * &x + &e;
+            let u = &self.feedback * &without_feedthrough + reference;
+            let y = without_feedthrough + &system.d * &u;
+            x = &system.a * &x + &system.b * &u + &system.k * e;
+            (u, y)
+        })
+    }
+
+    /// `copies` of the system that have nothing to do with each other, as one system.
+    #[must_use]
+    pub fn side_by_side(&self, copies: usize) -> Self {
+        let diagonal = |block: &DMatrix<f64>| {
+            let (rows, columns) = block.shape();
+            let mut all = DMatrix::zeros(copies * rows, copies * columns);
+            for copy in 0..copies {
+                all.view_mut((copy * rows, copy * columns), (rows, columns))
+                    .copy_from(block);
+            }
+            all
+        };
+        let system = &self.system;
+        Self {
+            system: StateSpace {
+                a: diagonal(&system.a),
+                b: diagonal(&system.b),
+                c: diagonal(&system.c),
+                d: diagonal(&system.d),
+                k: diagonal(&system.k),
+                sample_time: system.sample_time,
+            },
+            innovation_covariance: diagonal(&self.innovation_covariance),
+            feedback: diagonal(&self.feedback),
+        }
+    }
 }
 
-/// `u1`, `u2`, ... without units.
-fn channels(letter: char, count: usize) -> Vec<Channel> {
+/// Channels `u1`, `u2`, ... (for the letter `u`) without units.
+pub fn channels(letter: char, count: usize) -> Vec<Channel> {
     (1..=count)
         .map(|i| Channel {
             name: format!("{letter}{i}"),

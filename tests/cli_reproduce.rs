@@ -8,7 +8,7 @@ use std::fs;
 #[test]
 fn files_do_not_depend_on_the_number_of_threads() {
     let folder = Folder::new();
-    for (jobs, place) in [("1", "one"), ("3", "three")] {
+    for (threads, place) in [("1", "one"), ("3", "three")] {
         let run = folder.run(&[
             "reproduce",
             "chiuso-picci-1",
@@ -17,8 +17,8 @@ fn files_do_not_depend_on_the_number_of_threads() {
             "12",
             "--seed",
             "5",
-            "--jobs",
-            jobs,
+            "--threads",
+            threads,
             "--output-dir",
             place,
         ]);

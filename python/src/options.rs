@@ -29,6 +29,7 @@ pub fn options(json: &str) -> PyResult<Options> {
         input_delay: field(&given, "delay", Vec::new())?,
         stable: field(&given, "stable", false)?,
         seed: field(&given, "seed", 0)?,
+        memory_limit: None,
     })
 }
 

@@ -2,7 +2,7 @@
 
 use innovant::identify::{Recording, Records};
 use innovant::log::{Channel, LogError};
-use numpy::ndarray::{ArrayView2, s};
+use numpy::ndarray::{ArrayView2, Axis, Slice};
 
 use crate::arrays::{Samples, channels, recording_name};
 
@@ -139,7 +139,7 @@ impl Records for ArrayRecords<'_> {
             let columns = u.columns().into_iter().chain(y.columns());
             for ((block, column), channel) in self.block.iter_mut().zip(columns).zip(headers()) {
                 let mut finite = true;
-                let part = column.slice(s![from..from + rows]);
+                let part = column.slice_axis(Axis(0), Slice::from(from..from + rows));
                 for (to, value) in block.iter_mut().zip(&part) {
                     *to = *value;
                     finite &= value.is_finite();

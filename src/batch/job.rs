@@ -9,9 +9,9 @@ use sha2::{Digest, Sha256};
 
 use super::Batch;
 use super::row::{Row, Status};
-use crate::identify::FileRecords;
-use crate::log::{Source, write_file_atomically};
-use crate::report::{ModelDocument, ReadModel, Request, read_model};
+use crate::identify::{FileRecords, IdentifyError};
+use crate::log::{LogError, Source, write_file_atomically};
+use crate::report::{DocumentError, ModelDocument, ReadModel, Request, read_model};
 use crate::validate::{TestedModel, identify_and_test};
 
 /// Bytes hashed at a time.
@@ -35,12 +35,12 @@ pub(super) fn run(log: &Path, model: &Path, batch: &Batch) -> Row {
                 &tested.model,
                 tested.tests.as_ref(),
             ),
-            Err(message) => {
+            Err(failure) => {
                 // What an earlier content of this log left is not the model of this one.
-                if log.is_file() {
+                if failure.of_content {
                     let _ = fs::remove_file(model);
                 }
-                Row::failed(log, message)
+                Row::failed(log, failure.message)
             }
         },
     };
@@ -73,18 +73,54 @@ fn identified(
     model: &Path,
     batch: &Batch,
     request: Request,
-) -> Result<TestedModel, String> {
-    let records = FileRecords::open(vec![Source::from(log.to_owned())], batch.roles.clone());
-    let mut records = records.map_err(|error| error.to_string())?;
-    let tested =
-        identify_and_test(&mut records, &batch.options).map_err(|error| error.to_string())?;
-    let document = ModelDocument::new(&tested.model)
-        .map_err(|error| error.to_string())?
+) -> Result<TestedModel, Failure> {
+    let source = vec![Source::from(log.to_owned())];
+    let mut records = FileRecords::open(source, batch.roles.clone())?;
+    let tested = identify_and_test(&mut records, &batch.options)?;
+    let document = ModelDocument::new(&tested.model)?
         .with_residual_tests(tested.tests.clone())
         .with_request(request);
-    let text = document.to_json().map_err(|error| error.to_string())?;
-    write_file_atomically(model, text.as_bytes()).map_err(|error| error.to_string())?;
+    let text = document.to_json()?;
+    write_file_atomically(model, text.as_bytes())?;
     Ok(tested)
+}
+
+/// Why a log has no model.
+struct Failure {
+    message: String,
+    /// Whether it is because of what the log says. A disk that is full, a file that is away for a while or too little
+    /// memory say nothing about a model that is there from before.
+    of_content: bool,
+}
+
+impl From<LogError> for Failure {
+    fn from(error: LogError) -> Self {
+        Self {
+            of_content: !error.is_of_system(),
+            message: error.to_string(),
+        }
+    }
+}
+
+impl From<IdentifyError> for Failure {
+    fn from(error: IdentifyError) -> Self {
+        match error {
+            IdentifyError::Log(error) => error.into(),
+            error => Self {
+                of_content: !matches!(error, IdentifyError::Limit(_)),
+                message: error.to_string(),
+            },
+        }
+    }
+}
+
+impl From<DocumentError> for Failure {
+    fn from(error: DocumentError) -> Self {
+        Self {
+            message: error.to_string(),
+            of_content: true,
+        }
+    }
 }
 
 /// SHA-256 of the bytes of a file, hexadecimal, as [`crate::identify::Recording`] has it.

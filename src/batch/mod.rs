@@ -31,6 +31,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use crate::identify::Options;
+use crate::limits::{LimitError, memory_limit};
 use crate::log::Roles;
 
 pub use row::{Row, Status};
@@ -67,6 +68,9 @@ pub enum BatchError {
     /// A model would replace a log.
     #[error("{log}: its model would be written over it; choose another --output-dir")]
     OverLog { log: PathBuf },
+    /// The limit of memory cannot be read.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
     /// The directory cannot be made.
     #[error("{path}: cannot make this directory: {source}; choose another --output-dir")]
     Directory {
@@ -92,6 +96,18 @@ pub fn run(
         path: batch.output_dir.clone(),
         source,
     })?;
+    // As many logs as there are threads are in memory at once.
+    let share = match batch.options.memory_limit {
+        Some(bytes) => bytes,
+        None => memory_limit()?.bytes / rayon::current_num_threads() as u64,
+    };
+    let batch = &Batch {
+        options: Options {
+            memory_limit: Some(share),
+            ..batch.options.clone()
+        },
+        ..batch.clone()
+    };
     Ok(logs
         .par_iter()
         .zip(&models)

@@ -45,9 +45,6 @@ pub(super) struct Flags {
     /// Identify again also what is there already
     #[arg(long)]
     again: bool,
-    /// Threads [default: as many as there are cores]
-    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
 }
 
 pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
@@ -56,11 +53,6 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     }
     let sources: Vec<Source> = flags.logs.iter().cloned().map(Source::from).collect();
     check_distinct(&sources)?;
-    if let Some(threads) = flags.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads.into())
-            .build_global()?;
-    }
     let batch = Batch {
         output_dir: flags.output_dir,
         roles: flags.roles.roles(),

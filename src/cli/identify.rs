@@ -39,9 +39,6 @@ pub(super) struct Flags {
     roles: RoleFlags,
     #[command(flatten)]
     model: ModelFlags,
-    /// Threads [default: as many as there are cores]
-    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
     /// Write the model to this file, as JSON; `-` is standard output (then without the table)
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -67,11 +64,6 @@ impl Plan {
         let read = paths(&flags.logs);
         let (output, report) =
             Output::check_both(flags.output.as_deref(), flags.report.as_deref(), &read)?;
-        if let Some(threads) = flags.threads {
-            rayon::ThreadPoolBuilder::new()
-                .num_threads(threads.into())
-                .build_global()?;
-        }
         let (roles, options) = (flags.roles.roles(), flags.model.options());
         Ok(Self {
             sources: flags.logs,

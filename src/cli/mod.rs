@@ -14,6 +14,7 @@ mod numbers;
 mod output;
 mod progress;
 mod reproduce;
+mod resources;
 mod roles;
 mod schema;
 mod show;
@@ -28,6 +29,7 @@ use std::process::ExitCode;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::log::LogError;
+use resources::Resources;
 
 /// What is said above the list of commands.
 const ABOUT: &str =
@@ -50,6 +52,8 @@ Exit codes: 0 done; 1 the model or simulation was rejected; 2 an error.";
 struct Cli {
     #[command(flatten)]
     verbosity: Verbosity,
+    #[command(flatten)]
+    resources: Resources,
     #[command(subcommand)]
     command: Option<Command>,
 }
@@ -113,6 +117,7 @@ where
 
 fn dispatch(cli: Cli) -> anyhow::Result<Outcome> {
     let say = cli.verbosity;
+    cli.resources.apply()?;
     match cli.command {
         None => {
             output::print(&command().render_help().to_string())?;

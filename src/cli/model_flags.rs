@@ -114,6 +114,7 @@ impl ModelFlags {
             input_delay: self.delay.iter().map(|d| *d as usize).collect(),
             stable: self.stable,
             seed: self.seed,
+            memory_limit: None,
         }
     }
 }

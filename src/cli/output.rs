@@ -1,5 +1,6 @@
 //! Standard output, and files that must be writable before the work starts.
 
+use std::collections::HashSet;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -136,26 +137,24 @@ pub(super) fn paths(sources: &[Source]) -> Vec<&Path> {
 /// # Errors
 /// Says which.
 pub(super) fn check_distinct(sources: &[Source]) -> anyhow::Result<()> {
-    for (index, source) in sources.iter().enumerate() {
-        let same = |other: &&Source| match (source, *other) {
-            (Source::Path(a), Source::Path(b)) => {
-                match (fs::canonicalize(a), fs::canonicalize(b)) {
-                    // A pipe may be named twice and is another one each time.
-                    (Ok(a), Ok(b)) => a == b && a.is_file(),
-                    _ => a == b,
+    // A batch has thousands: each is looked at once.
+    let mut seen = HashSet::with_capacity(sources.len());
+    for source in sources {
+        match source {
+            Source::Stdin if !seen.insert(PathBuf::from("-")) => anyhow::bail!(
+                "`-` is given twice, and standard input can be read only once: name a file"
+            ),
+            Source::Stdin => {}
+            Source::Path(path) => {
+                let file = fs::canonicalize(path).unwrap_or_else(|_| path.clone());
+                // A pipe may be named twice and is another one each time.
+                let is_special = fs::metadata(&file).is_ok_and(|about| !about.is_file());
+                if !is_special && !seen.insert(file) {
+                    anyhow::bail!(
+                        "{source} is given twice: what it says would count twice; name each file once"
+                    );
                 }
             }
-            (a, b) => a == b,
-        };
-        if *source == Source::Stdin && sources[..index].contains(source) {
-            anyhow::bail!(
-                "`-` is given twice, and standard input can be read only once: name a file"
-            );
-        }
-        if sources[..index].iter().any(|other| same(&other)) {
-            anyhow::bail!(
-                "{source} is given twice: what it says would count twice; name each file once"
-            );
         }
     }
     Ok(())

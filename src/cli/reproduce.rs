@@ -11,11 +11,11 @@ use super::output::{Output, note, print};
 use super::{Outcome, Verbosity};
 use crate::report::text::reproduction_text;
 use crate::report::{reproduction_csv, reproduction_page, to_json};
-use crate::reproduce::{Experiment, Reproduction, Study, experiment, experiments, on_threads};
+use crate::reproduce::{Experiment, Reproduction, Study, experiment, experiments};
 
 const EXAMPLE: &str = "Examples:
   innovant reproduce van-wingerden-1 --output-dir pages
-  innovant reproduce all --runs 200 --jobs 2
+  innovant reproduce all --runs 200 --threads 2
 
 Each experiment writes NAME.html (a page with the figures of the paper), NAME.csv (all numbers) and NAME.json (all of
 it), and prints what the paper says, what is found here, and whether they agree. The same seed gives the same files,
@@ -34,22 +34,9 @@ pub(super) struct Flags {
     /// Seed that the runs are drawn from
     #[arg(long, value_name = "SEED", default_value = "1")]
     seed: u64,
-    /// Number of threads [default: as many as there are cores]
-    #[arg(long, value_name = "N", value_parser = jobs)]
-    jobs: Option<usize>,
     /// Folder for the files; it is made if need be
     #[arg(short, long, value_name = "DIR", default_value = "reproduction")]
     output_dir: PathBuf,
-}
-
-/// Threads beyond this many are a typing error.
-const MOST_JOBS: usize = 1024;
-
-fn jobs(text: &str) -> Result<usize, String> {
-    text.parse()
-        .ok()
-        .filter(|jobs| (1..=MOST_JOBS).contains(jobs))
-        .ok_or_else(|| format!("expected a number of threads from 1 to {MOST_JOBS}"))
 }
 
 /// The three files of an experiment.
@@ -110,11 +97,11 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
             seed: flags.seed,
             progress: &progress,
         };
-        let found = on_threads(flags.jobs, || experiment.reproduce(&study));
+        let found = experiment.reproduce(&study);
         if let Some(bar) = &bar {
             bar.finish_and_clear();
         }
-        let found = found??;
+        let found = found?;
         files.write(&found)?;
         if !say.quiet {
             print(&format!("{}\n", reproduction_text(&found)))?;
@@ -201,13 +188,5 @@ mod tests {
             .unwrap()
             .to_string();
         assert!(error.contains("van-wingerden-1"), "{error}");
-    }
-
-    #[test]
-    fn jobs_are_a_sensible_number() {
-        assert_eq!(jobs("2"), Ok(2));
-        for wrong in ["0", "-1", "two", "100000"] {
-            assert!(jobs(wrong).is_err(), "{wrong}");
-        }
     }
 }

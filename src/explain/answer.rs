@@ -12,6 +12,7 @@ use super::explanation::{
 use super::fit::{Fit, Problem};
 use super::inquiry::{Finding, NEEDED, inquire};
 use super::locate;
+use super::memory;
 use super::noise::Mask;
 use super::probability::probability;
 use super::prove;
@@ -54,6 +55,7 @@ pub fn explain(
             return Err(ExplainError::UnknownEffect { id: id.clone() });
         }
     }
+    memory::check(recordings)?;
     let known = know(recordings, simulation)?;
     let allowed = |d: &Definition| !options.without.iter().any(|id| id == d.id);
     let drive = weak::attempt(recordings, &known, &allowed);

@@ -1,10 +1,15 @@
 //! What can be wrong with a question to `explain`.
 
+use crate::limits::LimitError;
+
 /// Why there is no answer. Messages are worded for the command line.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum ExplainError {
+    /// It would take more memory than it may.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
     /// No recording was given.
     #[error("explain needs at least one recording")]
     NoRecording,

@@ -19,6 +19,7 @@
 //! | `cascade`, `tanks`, `rectified` | plants of another class, which no effect added to the linear one becomes |
 //! | `search`, `refine`, `plausible`, `second`, `inquiry` | the fits, what is kept of them, the decision |
 //! | `weak` | drives: the averaged equation of motion, where a free run cannot tell |
+//! | `memory` | what a question takes of it |
 //! | `exact`, `adequacy` | tests without fits, and of what is left |
 //! | `locate`, `curve`, `prove`, `probability` | where, the law without a form, held-out blocks, how sure |
 //! | `answer`, `account`, `words`, `explanation`, `augmented`, `start` | what is said, and the model that can be run |
@@ -42,6 +43,7 @@ mod fit;
 mod functionals;
 mod inquiry;
 mod locate;
+mod memory;
 mod noise;
 mod offset;
 mod plant;

@@ -12,7 +12,7 @@ use crate::moments::{
 
 /// Blocks of the delete-block jackknife: enough degrees of freedom for its quantiles, few enough that
 /// each is long.
-const JACKKNIFE_BLOCKS: usize = 20;
+pub(super) const JACKKNIFE_BLOCKS: usize = 20;
 /// Two channels whose correlation differs from one by less are the same signal to rounding.
 const SAME_SIGNAL: f64 = 1e-12;
 /// A channel that varies by less, relative to its size, is constant to rounding.

@@ -1,5 +1,6 @@
 //! Why a model could not be identified, and what to do about it.
 
+use crate::limits::LimitError;
 use crate::linalg::LinalgError;
 use crate::log::LogError;
 
@@ -9,6 +10,9 @@ pub enum IdentifyError {
     /// The recording could not be read.
     #[error(transparent)]
     Log(#[from] LogError),
+    /// It would take more memory than it may.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
     /// A factorisation failed on data that should allow it.
     #[error("numerical failure: {0}")]
     Linalg(#[from] LinalgError),

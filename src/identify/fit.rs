@@ -9,6 +9,7 @@ use super::error::IdentifyError;
 use super::finish::{Chosen, finish};
 use super::free_run::low_order;
 use super::horizon;
+use super::memory::Sizes;
 use super::options::{Options, Order};
 use super::records::Records;
 use super::resolution::stepped;
@@ -23,8 +24,6 @@ use crate::moments::Trend;
 
 /// Largest order `(p + 1) q` of the data factor that is chosen automatically.
 const LARGEST_AUTOMATIC_FACTOR: usize = 2000;
-/// Largest order of the data factor at all: its Gram matrix takes 3.2 GB.
-const LARGEST_FACTOR: usize = 20_000;
 /// Target of the truncation measure when the past window is lengthened: well below the gate, because
 /// the measure is itself an estimate.
 const TRUNCATION_TARGET: f64 = 0.1;
@@ -171,15 +170,27 @@ pub(super) fn lags_needed(
     outputs: usize,
 ) -> Result<usize, IdentifyError> {
     let q = inputs + outputs;
-    check_windows(options, q, outputs)?;
+    check_windows(options, outputs)?;
     let longest = longest_past(options, q);
     let lags = options.method.lags(longest, options.future);
-    Ok(options
+    let lags = options
         .stochastic
-        .map_or(lags, |step| lags.max(step.lags(longest, options.future))))
+        .map_or(lags, |step| lags.max(step.lags(longest, options.future)));
+    Sizes {
+        inputs,
+        outputs,
+        past: options.past,
+        lags,
+        order: match options.order {
+            Order::Auto => None,
+            _ => Some(options.order.largest()),
+        },
+    }
+    .check(options)?;
+    Ok(lags)
 }
 
-fn check_windows(options: &Options, q: usize, outputs: usize) -> Result<(), IdentifyError> {
+fn check_windows(options: &Options, outputs: usize) -> Result<(), IdentifyError> {
     let (past, future) = (options.past, options.future);
     let wrong = |reason: String| {
         let asked: Vec<String> = [("--past", past), ("--future", future)]
@@ -200,19 +211,9 @@ fn check_windows(options: &Options, q: usize, outputs: usize) -> Result<(), Iden
     {
         return wrong("the future window cannot be longer than the past window".to_owned());
     }
-    if let Some(past) = past
-        && (past.saturating_add(1)).saturating_mul(q) > LARGEST_FACTOR
-    {
-        return wrong(format!(
-            "the data factor would have (past + 1) x {q} channels = {} columns; the limit is {LARGEST_FACTOR} \
-             ({:.1} GB); lower --past",
-            (past.saturating_add(1)).saturating_mul(q),
-            (LARGEST_FACTOR * LARGEST_FACTOR * 8) as f64 / 1e9
-        ));
-    }
     let largest = match (past, future) {
-        (_, Some(future)) => Some(future * outputs),
-        (Some(past), None) => Some(past * outputs),
+        (_, Some(future)) => Some(future.saturating_mul(outputs)),
+        (Some(past), None) => Some(past.saturating_mul(outputs)),
         (None, None) => None,
     };
     let orders: Vec<usize> = match &options.order {
@@ -247,6 +248,12 @@ fn windowed(
     past: usize,
     options: &Options,
 ) -> Result<Windowed, IdentifyError> {
+    Sizes {
+        past: Some(past),
+        lags: past,
+        ..source.sizes()
+    }
+    .check(options)?;
     let factor = source.factor(past)?;
     let varx = Arc::new(varx(&factor, options.feedthrough)?);
     Ok(Windowed { factor, varx })

@@ -38,6 +38,7 @@ mod fit;
 mod free_run;
 mod horizon;
 pub mod knudsen;
+mod memory;
 pub mod method;
 mod model;
 mod nested;

@@ -91,6 +91,10 @@ pub struct Options {
     pub stable: bool,
     /// Seed of everything drawn (confidence bounds by draws).
     pub seed: u64,
+    /// Most memory in bytes that this identification may take; `None` is the limit of the process
+    /// ([`memory_limit`](crate::limits::memory_limit)).
+    #[serde(skip)]
+    pub memory_limit: Option<u64>,
 }
 
 impl Options {

@@ -259,7 +259,18 @@ impl Records for FileRecords<'_> {
     ) -> Result<(), LogError> {
         let known = self.summaries[experiment].as_ref().map(|s| s.samples);
         if let Some(samples) = known {
-            let wanted = limit.unwrap_or(usize::MAX).min(samples);
+            let mut wanted = limit.unwrap_or(usize::MAX).min(samples);
+            if !self.sources[experiment].can_be_read_again() {
+                let name = || self.sources[experiment].to_string();
+                match limit {
+                    // As much as there is left.
+                    Some(_) => wanted = wanted.min(self.kept_samples(experiment)),
+                    None if self.kept_samples(experiment) < wanted => {
+                        return Err(LogError::ReadOnce { name: name() });
+                    }
+                    None => {}
+                }
+            }
             if self.kept_samples(experiment) >= wanted {
                 let columns: Vec<&[f64]> = self.kept[experiment]
                     .iter()
@@ -275,11 +286,9 @@ impl Records for FileRecords<'_> {
         if first_time {
             self.kept[experiment] = vec![Vec::new(); channels];
         }
-        let mut left = if first_time {
-            usize::MAX
-        } else {
-            limit.unwrap_or(usize::MAX)
-        };
+        // A file that has grown since is read as far as the first time.
+        let wanted = known.map_or(usize::MAX, |samples| limit.unwrap_or(samples).min(samples));
+        let mut left = wanted;
         let mut block = Block::new();
         while left > 0 && reader.next_block(&mut block)? {
             let take = block.len().min(left);
@@ -308,6 +317,12 @@ impl Records for FileRecords<'_> {
                 )?;
             }
             self.summaries[experiment] = Some(summary);
+        } else if left > 0 {
+            return Err(LogError::Changed {
+                name: reader.name().to_owned(),
+                expected: wanted,
+                found: wanted - left,
+            });
         }
         Ok(())
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::candidate::{Candidate, Window, cost_p_value};
 use super::error::IdentifyError;
 use super::horizon;
+use super::memory::Sizes;
 use super::method::{Decomposed, Method, Windows};
 use super::options::{Options, Order};
 use super::order::{self, OrderEvidence};
@@ -145,7 +146,7 @@ fn select_by(
                 format!("order {best}: smallest Schwarz criterion of those asked for"),
             )
         }
-        Order::Auto => choose_order(&mut evidence, varx, &mut estimator),
+        Order::Auto => choose_order(&mut evidence, varx, &mut estimator)?,
     };
     estimator.for_good(polish, proposal_only);
     let candidate = estimator.finished(order)?;
@@ -242,6 +243,12 @@ impl Estimator<'_, '_> {
         let index = match known {
             Some(index) => index,
             None => {
+                let sizes = Sizes {
+                    past: Some(self.window.windows.factor.past),
+                    order: Some(order),
+                    ..self.source.sizes()
+                };
+                sizes.check(self.options)?;
                 let decomposition = self.decomposition(self.future_for(order))?;
                 let possible = decomposition.largest_order;
                 if order > possible {
@@ -343,13 +350,17 @@ fn choose_order(
     evidence: &mut Vec<OrderEvidence>,
     varx: &Varx,
     estimator: &mut Estimator<'_, '_>,
-) -> (usize, String) {
+) -> Result<(usize, String), IdentifyError> {
     let proposal = order::proposal(evidence).unwrap_or(1);
     let largest = evidence.len().max(1);
     let test = |evidence: &mut Vec<OrderEvidence>, estimator: &mut Estimator<'_, '_>, n: usize| {
-        if let Ok(candidate) = estimator.candidate(n) {
-            note(evidence, candidate, varx);
+        match estimator.candidate(n) {
+            Ok(candidate) => note(evidence, candidate, varx),
+            // How much memory there is must not decide which model comes out.
+            Err(error @ IdentifyError::Limit(_)) => return Err(error),
+            Err(_) => {}
         }
+        Ok(())
     };
     let find = |evidence: &[OrderEvidence], n: usize| -> Option<OrderEvidence> {
         let entry = evidence.iter().find(|e| e.order == n)?;
@@ -359,21 +370,21 @@ fn choose_order(
     let accepts = |e: &OrderEvidence| e.p_value.is_none_or(|p| p >= order::REFEREE_LEVEL);
 
     let mut start = proposal;
-    test(evidence, estimator, start);
+    test(evidence, estimator, start)?;
     while start > 1 && find(evidence, start).is_none() {
         start -= 1;
-        test(evidence, estimator, start);
+        test(evidence, estimator, start)?;
     }
     let Some(mut best) = find(evidence, start) else {
-        return (
+        return Ok((
             proposal,
             format!("order {proposal}: smallest singular value criterion"),
-        );
+        ));
     };
     if accepts(&best) {
         while best.order > 1 {
             let order = best.order - 1;
-            test(evidence, estimator, order);
+            test(evidence, estimator, order)?;
             // The test of the whole model may accept what a comparison with one state more would not.
             let will_do = |e: &OrderEvidence| accepts(e) && e.schwarz <= best.schwarz;
             if !find(evidence, order).is_some_and(|e| will_do(&e))
@@ -398,7 +409,7 @@ fn choose_order(
             "smallest singular value criterion; the chi-square test accepts it, and one state less is worse"
                 .to_owned()
         };
-        return (order, format!("order {order}: {reason}"));
+        return Ok((order, format!("order {order}: {reason}")));
     }
     let last = if start < proposal {
         start
@@ -406,23 +417,23 @@ fn choose_order(
         (proposal + order::ORDERS_ABOVE).min(largest)
     };
     for order in start + 1..=last {
-        test(evidence, estimator, order);
+        test(evidence, estimator, order)?;
         if find(evidence, order).is_some_and(|e| accepts(&e)) {
-            return (
+            return Ok((
                 order,
                 format!(
                     "order {order}: the singular value criterion proposes {proposal}, but the chi-square test \
                      rejects everything below {order}"
                 ),
-            );
+            ));
         }
     }
     let order = best_by_schwarz(evidence, |_| true).unwrap_or(start);
-    (
+    Ok((
         order,
         format!(
             "order {order}: smallest Schwarz criterion of those that could be computed; the chi-square test accepts \
              none of them, so the plant is not linear of a low order, or the past window is too short for it"
         ),
-    )
+    ))
 }

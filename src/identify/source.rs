@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::data::Data;
 use super::delay::AlignedColumns;
 use super::error::IdentifyError;
+use super::memory::Sizes;
 use super::records::Records;
 use crate::moments::{RFactor, Trend};
 
@@ -37,6 +38,17 @@ impl<'a> Source<'a> {
     /// The moments and the recordings.
     pub(super) fn parts(&mut self) -> (&'a Data, &mut dyn Records) {
         (self.data, self.records)
+    }
+
+    /// What is known of the sizes of an identification: channels and lags.
+    pub(super) fn sizes(&self) -> Sizes {
+        Sizes {
+            inputs: self.records.inputs().len(),
+            outputs: self.records.outputs().len(),
+            past: None,
+            lags: self.data.lags(),
+            order: None,
+        }
     }
 
     /// The triangular factor of all windows of `past + 1` samples. `past` is at most the number of lags that the

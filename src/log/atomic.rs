@@ -1,12 +1,23 @@
 //! A file appears whole or not at all.
+//!
+//! It is written beside its place, as `.innovant-*.part`, and takes its name in the end. A process that is killed leaves
+//! such a part; the next one that writes into the same folder clears it. A part is locked as long as its writer lives,
+//! so that parts of other processes are left alone.
 
-use std::fs::{self, File, OpenOptions};
+use std::collections::BTreeSet;
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 use tempfile::NamedTempFile;
 
 use super::error::LogError;
+
+/// How the names of parts begin and end.
+const PART: (&str, &str) = (".innovant-", ".part");
+/// Folders that this process has cleared of parts: once is enough, and a batch writes thousands of files into one.
+static CLEARED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// Where bytes go until they are complete.
 enum Place {
@@ -100,19 +111,56 @@ fn beside(target: &Path, existing: Option<fs::Metadata>) -> io::Result<NamedTemp
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty())
         .unwrap_or(Path::new("."));
+    clear_once(folder);
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".innovant-").suffix(".part");
+    builder.prefix(PART.0).suffix(PART.1);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
         // Passed to open(2), which takes the umask off.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    let file = builder.tempfile_in(folder)?;
+    let file = loop {
+        let file = builder.tempfile_in(folder)?;
+        // Who clears the folder may have come between: then the lock is theirs, or the file is gone. Where files
+        // cannot be locked nobody clears either.
+        let lost = matches!(file.as_file().try_lock(), Err(TryLockError::WouldBlock));
+        if !lost && file.path().exists() {
+            break file;
+        }
+    };
     if let Some(about) = existing {
         file.as_file().set_permissions(about.permissions())?;
     }
     Ok(file)
+}
+
+/// Clears `folder`, the first time that this process writes into it.
+fn clear_once(folder: &Path) {
+    let Ok(mut cleared) = CLEARED.lock() else {
+        return;
+    };
+    if cleared.insert(folder.to_owned()) {
+        clear(folder);
+    }
+}
+
+/// Deletes the parts that processes left which are no more. What cannot be read or deleted is no reason not to write.
+fn clear(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with(PART.0)
+            && name.ends_with(PART.1)
+            && let Ok(file) = OpenOptions::new().write(true).open(entry.path())
+            && file.try_lock().is_ok()
+        {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 impl Write for AtomicFile {
@@ -144,4 +192,26 @@ pub fn write_file_atomically(path: &Path, contents: &[u8]) -> Result<(), LogErro
         source,
     })?;
     file.commit()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_of_the_dead_are_cleared_and_those_of_the_living_are_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let left = folder.path().join(".innovant-dead.part");
+        fs::write(&left, "half").unwrap();
+        let other = folder.path().join(".innovant-notes.txt");
+        fs::write(&other, "mine").unwrap();
+        let target = folder.path().join("model.json");
+        let mut living = AtomicFile::create(&target).unwrap();
+        assert!(!left.exists() && other.exists());
+        living.write_all(b"whole").unwrap();
+        // As another process would.
+        clear(folder.path());
+        living.commit().unwrap();
+        assert_eq!(fs::read(&target).unwrap(), b"whole");
+    }
 }

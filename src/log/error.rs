@@ -3,6 +3,8 @@
 use std::io;
 use std::path::PathBuf;
 
+use crate::limits::LimitError;
+
 /// Everything that can go wrong when a log is read or written.
 ///
 /// A message starts with the file and, where there is one, the line (from 1; the header counts) and the column, says
@@ -17,12 +19,44 @@ pub enum LogError {
     )]
     Open { name: String, source: io::Error },
     /// Reading stopped half-way.
-    #[error("{name}, after line {line}: cannot read on: {source}")]
+    #[error(
+        "{name}, after line {line}: cannot read on: {source}; check the disk or the connection that it comes from, and \
+         run this again"
+    )]
     Read {
         name: String,
         line: u64,
         source: io::Error,
     },
+    /// A pipe that would have to be read twice.
+    #[error(
+        "{name}: this recording has to be read a second time, and a pipe gives its bytes only once; save it to a file \
+         and give the name of that"
+    )]
+    ReadOnce { name: String },
+    /// A second reading found another recording.
+    #[error(
+        "{name}: the file changed while it was read: {found} samples at the second reading, {expected} at the first; \
+         identify it when nothing writes to it any more, or from a copy"
+    )]
+    Changed {
+        name: String,
+        expected: usize,
+        found: usize,
+    },
+    /// A file that was cut while it was read.
+    #[error(
+        "{name}: the file became shorter while it was read: {found} of {expected} bytes were there; read it again when \
+         nothing writes to it any more, or from a copy"
+    )]
+    Shrunk {
+        name: String,
+        expected: u64,
+        found: u64,
+    },
+    /// More than memory may hold.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
     /// The compressed data are damaged or are not gzip at all.
     #[error(
         "{name}, after line {line}: broken gzip data: {source}; `gzip -t` tells whether the file is whole: copy it \
@@ -336,6 +370,20 @@ pub enum LogError {
 }
 
 impl LogError {
+    /// Whether it is the machine that failed, and not what is written in the file.
+    pub(crate) fn is_of_system(&self) -> bool {
+        matches!(
+            self,
+            Self::Open { .. }
+                | Self::Read { .. }
+                | Self::ReadOnce { .. }
+                | Self::Changed { .. }
+                | Self::Shrunk { .. }
+                | Self::Limit(_)
+                | Self::Write { .. }
+        )
+    }
+
     /// Whether the reader of our standard output has gone (`innovant ... | head`): success for a command line.
     pub fn is_broken_pipe(&self) -> bool {
         matches!(self, Self::Write { source, .. } if source.kind() == io::ErrorKind::BrokenPipe)

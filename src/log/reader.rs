@@ -159,6 +159,11 @@ impl LogReader {
         self.has_time
     }
 
+    /// Samples read so far.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
     /// Raw bytes read so far, for a progress bar.
     pub fn bytes_read(&self) -> u64 {
         self.lines.stream().bytes_read()
@@ -258,6 +263,15 @@ impl LogReader {
     pub fn finish(mut self) -> Result<LogSummary, LogError> {
         let mut block = Block::new();
         while self.next_block(&mut block)? {}
+        if let Some(expected) = self.bytes_total()
+            && self.bytes_read() < expected
+        {
+            return Err(LogError::Shrunk {
+                name: self.name().to_owned(),
+                expected,
+                found: self.bytes_read(),
+            });
+        }
         let (sample_time, start_time) = match (&self.sampling, self.sample_time) {
             (Some(sampling), _) => sampling.finish(self.parser.header())?,
             (None, given) => (given.unwrap_or(f64::NAN), 0.0),

@@ -9,6 +9,7 @@ use super::reader::{Block, LogReader, check_same_channels, check_same_sampling};
 use super::roles::{RoleNeed, Roles};
 use super::source::Source;
 use super::writer::write_table;
+use crate::limits;
 
 /// A recording: a uniform time base, named inputs u and named outputs y; a column a channel, N samples each.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +30,33 @@ pub struct Log {
     pub output_data: Vec<Vec<f64>>,
     /// SHA-256 (hexadecimal) of the file's raw bytes, when it came from a file.
     pub sha256: Option<String>,
+}
+
+/// Arrays of the size of a recording that a command holds at the peak: the recording, what is simulated or predicted from
+/// it, and what is left.
+const COPIES: usize = 3;
+
+/// Refuses a recording that will not fit: from the first block on its length is known from the bytes that are left.
+fn check_memory(reader: &LogReader) -> Result<(), LogError> {
+    let channels = reader.inputs().len() + reader.outputs().len();
+    let read = reader.samples();
+    let samples = match (reader.bytes_total(), reader.bytes_read()) {
+        (Some(total), bytes) if bytes > 0 => (read as f64 * (total as f64 / bytes as f64)) as usize,
+        _ => read,
+    };
+    let samples = samples.max(read);
+    limits::check(
+        limits::of_numbers(&[COPIES, samples, channels]),
+        None,
+        || {
+            format!(
+                "{}: {samples} samples of {channels} channels",
+                reader.name()
+            )
+        },
+        || "take a part of the recording, or fewer columns with --inputs and --outputs".to_owned(),
+    )?;
+    Ok(())
 }
 
 impl Log {
@@ -88,6 +116,7 @@ impl Log {
             {
                 column.extend_from_slice(more);
             }
+            check_memory(&reader)?;
         }
         let summary = reader.finish()?;
         Ok(Self {

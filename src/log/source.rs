@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 use std::fmt;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufReader, Chain, Cursor, Read};
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -61,6 +61,15 @@ impl fmt::Display for Source {
 }
 
 impl Source {
+    /// Whether a second reading gives the same bytes: that of a file does, a pipe has none left.
+    pub fn can_be_read_again(&self) -> bool {
+        match self {
+            Self::Stdin => false,
+            // What is not there any more fails with its own message.
+            Self::Path(path) => fs::metadata(path).map_or(true, |about| about.is_file()),
+        }
+    }
+
     /// Opens the source and looks at its first two bytes.
     pub(super) fn open(&self) -> Result<Stream, LogError> {
         let failed = |source| LogError::Open {
@@ -79,7 +88,15 @@ impl Source {
                 let gzip = path
                     .extension()
                     .is_some_and(|extension| extension.eq_ignore_ascii_case("gz"));
-                Stream::new(Box::new(file), gzip, size).map_err(failed)
+                match size {
+                    // A file that is being written to is read as far as it went when it was opened. (Files that say
+                    // they are empty may be made while they are read, as those of /proc.)
+                    Some(size) if size > 0 => {
+                        Stream::new(Box::new(file.take(size)), gzip, Some(size))
+                    }
+                    _ => Stream::new(Box::new(file), gzip, None),
+                }
+                .map_err(failed)
             }
         }
     }

@@ -79,7 +79,7 @@ impl std::fmt::Debug for LagAccumulator {
 impl LagAccumulator {
     /// An empty accumulator for `channels` channels and lags `0..=lags`.
     pub fn new(channels: usize, lags: usize) -> Self {
-        let segment = lags.next_power_of_two().max(SHORTEST_SEGMENT);
+        let segment = Self::segment_of(lags);
         let transform = RealFftPlanner::new().plan_fft_forward(2 * segment);
         let bins = segment + 1;
         Self {
@@ -103,6 +103,13 @@ impl LagAccumulator {
             pair: Split::zeros(bins),
             transform,
         }
+    }
+
+    /// Samples of a segment that holds `lags` lags.
+    pub(crate) fn segment_of(lags: usize) -> usize {
+        lags.checked_next_power_of_two()
+            .unwrap_or(usize::MAX)
+            .max(SHORTEST_SEGMENT)
     }
 
     /// Number of samples so far.

@@ -2,6 +2,8 @@
 
 use std::io;
 
+use crate::limits::LimitError;
+
 /// A document that cannot be read, or a model that cannot be written as one.
 ///
 /// A message starts with the file and, where there is one, line, column and key.
@@ -9,6 +11,9 @@ use std::io;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum DocumentError {
+    /// It would take more memory than it may.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
     /// The file does not exist or may not be read.
     #[error("{name}: cannot open: {source}; check the path and its permissions")]
     Open { name: String, source: io::Error },

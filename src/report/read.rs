@@ -13,12 +13,17 @@ use super::error::DocumentError;
 use super::location::{offset, path_at, position_of};
 use super::model_document::{MODEL_FORMAT, ModelDocument};
 use crate::identify::{IdentifiedChannel, Model, Summary};
+use crate::limits;
 use crate::log::Channel;
 use crate::model::{ModelError, StateSpace};
 
 /// What to do about a document that is JSON but no model.
 const SEE_SCHEMA: &str = "a model needs at least A, B, C and dt (sample_time); `innovant schema model` prints the \
                           whole format";
+
+/// Memory that a byte of a document takes at the peak, as text, as document and as model: 128 MB for 12 MB of zeros, the
+/// shortest numbers there are.
+const BYTES_A_BYTE: u64 = 10;
 
 /// A model with what its document says beyond it.
 #[derive(Debug, Clone)]
@@ -40,6 +45,13 @@ pub fn read_model(path: &Path) -> Result<ReadModel, DocumentError> {
     } else {
         path.display().to_string()
     };
+    let length = fs::metadata(path).map_or(0, |about| about.len());
+    limits::check(
+        length.saturating_mul(BYTES_A_BYTE),
+        None,
+        || format!("{name}: reading a document of {}", limits::size(length)),
+        || "give a model of a lower order".to_owned(),
+    )?;
     let bytes = if stdin {
         let mut bytes = Vec::new();
         io::stdin().read_to_end(&mut bytes).map(|_| bytes)

@@ -33,14 +33,6 @@ pub enum ReproduceError {
         /// What it said.
         first: String,
     },
-    /// The threads could not be started.
-    #[error("{jobs} threads cannot be started: {reason}; ask for fewer with --jobs")]
-    Threads {
-        /// How many were asked for.
-        jobs: usize,
-        /// What the system says.
-        reason: String,
-    },
     /// A table of numbers could not be written.
     #[error("the numbers cannot be written as CSV: {0}")]
     Csv(#[from] csv::Error),

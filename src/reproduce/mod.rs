@@ -42,7 +42,7 @@ pub use document::{Agreement, Comparison, Fact, Origin, REPRODUCTION_FORMAT, Rep
 pub use error::ReproduceError;
 pub use figure::{BarSeries, Bars, Curve, Figure, Panel, Quantity, Role, Row, Table};
 pub use knudsen::{KnudsenExperiment, knudsen_experiments};
-pub use study::{LEAST_RUNS, Study, on_threads};
+pub use study::{LEAST_RUNS, Study};
 pub use van_wingerden::{VanWingerdenOne, VanWingerdenTwo};
 
 /// An experiment of a paper.

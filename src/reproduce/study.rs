@@ -97,27 +97,6 @@ pub(super) fn successes<T, E: std::fmt::Display>(
     }
 }
 
-/// Runs `work` on `jobs` threads; `None` for as many as there are cores.
-///
-/// # Errors
-/// [`ReproduceError::Threads`].
-pub fn on_threads<T: Send>(
-    jobs: Option<usize>,
-    work: impl FnOnce() -> T + Send,
-) -> Result<T, ReproduceError> {
-    let Some(jobs) = jobs else {
-        return Ok(work());
-    };
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(jobs)
-        .build()
-        .map_err(|error| ReproduceError::Threads {
-            jobs,
-            reason: error.to_string(),
-        })?;
-    Ok(pool.install(work))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -133,8 +112,11 @@ mod tests {
     #[test]
     fn runs_do_not_depend_on_threads_or_on_their_number() {
         let draw = |runs| study(3).monte_carlo(runs, |seed| seed);
-        let one = on_threads(Some(1), || draw(100)).unwrap();
-        let three = on_threads(Some(3), || draw(100)).unwrap();
+        let on_threads = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            pool.build().unwrap().install(|| draw(100))
+        };
+        let (one, three) = (on_threads(1), on_threads(3));
         assert_eq!(one, three);
         assert_eq!(one[..10], draw(10));
         assert_ne!(one, study(4).monte_carlo(100, |seed| seed));

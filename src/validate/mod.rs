@@ -69,6 +69,7 @@ pub use result::{
     FitMeasure, InnovationSize, OutputFit, OutputSize, PairCorrelation, ResidualTest, Strongest,
     Validation,
 };
+pub(crate) use sensitivity::numbers as numbers_of_tests;
 
 use nalgebra::DMatrix;
 

@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use super::MOST_LAGS;
 use super::curvature::Curvature;
 use super::error::ValidateError;
 use super::filters::{Filters, Segment};
@@ -20,6 +21,8 @@ const FEWEST_SAMPLES: usize = 4_000;
 const EFFORT: usize = 40_000_000;
 /// Samples handled at a time.
 const BLOCK: usize = 512;
+/// Matrices of tested regressors times sensitivities that are there at once.
+const PRODUCTS: usize = 6;
 /// Batches that tell how accurate the averages are, at most and at least so long.
 const BATCHES: usize = 16;
 const SHORTEST_BATCH: usize = 64;
@@ -41,6 +44,8 @@ pub(super) struct Sensitivity {
     past: usize,
     /// Covariance of the coordinates along the directions.
     covariance: DMatrix<f64>,
+    /// Whether that is the identity.
+    uncorrelated: bool,
     /// Number of parameters that the data determine.
     rank: usize,
     /// Models drawn from the covariance; only along its range.
@@ -62,6 +67,21 @@ pub(super) struct Averages {
     pub(super) remainder: f64,
     /// Samples averaged over.
     pub(super) samples: usize,
+}
+
+/// Numbers that the averages take for a model of `inputs` and `outputs` whose covariance has so many directions: the
+/// sensitivities of all samples, and [`PRODUCTS`] products of them with the tested regressors.
+pub(crate) fn numbers(inputs: usize, outputs: usize, directions: usize) -> usize {
+    let channels = inputs.saturating_add(outputs);
+    let width = channels.saturating_mul(MOST_LAGS + 1);
+    let each = directions.saturating_mul(outputs);
+    let samples = samples_followed(each, width);
+    each.saturating_mul(samples.saturating_add(width.saturating_mul(PRODUCTS)))
+}
+
+/// Samples that sensitivities are averaged over, where each has `each` numbers and is multiplied with `width`.
+fn samples_followed(each: usize, width: usize) -> usize {
+    (EFFORT / each.saturating_mul(width).max(1)).clamp(FEWEST_SAMPLES, MOST_SAMPLES)
 }
 
 impl Sensitivity {
@@ -86,7 +106,7 @@ impl Sensitivity {
         }
         let (r, l) = (system.inputs(), system.outputs());
         let width = (past + 1) * (r + l);
-        let limit = (EFFORT / (m * l * width)).clamp(FEWEST_SAMPLES, MOST_SAMPLES);
+        let limit = samples_followed(m * l, width);
         let total: usize = records.iter().map(RecordView::samples).sum();
         let filters = Filters::new(system, covariance, &basis);
         let mut segments = Vec::new();
@@ -145,6 +165,7 @@ impl Sensitivity {
             outputs: l,
             past,
             covariance: inner,
+            uncorrelated: !whole_space,
             rank,
             excess: excess.into_iter().map(|v| v / used).collect(),
         }))
@@ -158,6 +179,15 @@ impl Sensitivity {
     /// Covariance of the coordinates along the directions.
     pub(super) fn covariance(&self) -> &DMatrix<f64> {
         &self.covariance
+    }
+
+    /// `tr(a Cov b')`, `Cov` being the covariance of the coordinates.
+    fn inner(&self, a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
+        if self.uncorrelated {
+            a.dot(b)
+        } else {
+            multiply(a, &self.covariance).dot(b)
+        }
     }
 
     /// Averages for a test: `tested` given `conditions`, which are lags of the residuals.
@@ -196,7 +226,9 @@ impl Sensitivity {
 
         let mut sum = DMatrix::zeros(regressors.len(), l * m);
         let mut information = DMatrix::zeros(m, m);
-        let mut batches: Vec<DMatrix<f64>> = Vec::new();
+        // Of the batches only sums are kept: each is as large as the averages themselves.
+        let (mut batches, mut squares) = (0.0, 0.0);
+        let mut of_batches = DMatrix::zeros(rank_w * rank_t, m);
         for segment in &self.segments {
             let mut from = self.past;
             while from < segment.samples {
@@ -226,24 +258,20 @@ impl Sensitivity {
                     }
                     begin = end;
                 }
-                batches.push(whiten(&part, (to - from) as f64));
+                let whitened = whiten(&part, (to - from) as f64);
+                batches += 1.0;
+                squares += self.inner(&whitened, &whitened);
+                of_batches += whitened;
                 sum += part;
                 from = to;
             }
         }
         let cross = whiten(&sum, used as f64);
-        let count = batches.len() as f64;
-        let scatter: f64 = batches
-            .iter()
-            .map(|part| {
-                let difference = part - &cross;
-                multiply(&difference, &self.covariance)
-                    .component_mul(&difference)
-                    .sum()
-            })
-            .sum();
-        let error = if count > 1.0 {
-            scatter / (count * (count - 1.0) * (cross.nrows().max(1)) as f64)
+        // Sum over the batches of the squared distance to `cross`.
+        let scatter =
+            squares - 2.0 * self.inner(&of_batches, &cross) + batches * self.inner(&cross, &cross);
+        let error = if batches > 1.0 {
+            scatter.max(0.0) / (batches * (batches - 1.0) * (cross.nrows().max(1)) as f64)
         } else {
             0.0
         };

@@ -89,9 +89,13 @@ impl Method {
     pub fn lags(self, past: usize, future: Option<usize>) -> usize {
         match self {
             Self::PbsidOpt => past,
-            Self::Whitening | Self::InnovationEstimation => past + future.unwrap_or(past),
+            Self::Whitening | Self::InnovationEstimation => {
+                past.saturating_add(future.unwrap_or(past))
+            }
             // An order that fits the past window of l outputs has a future of at most past + 2.
-            Self::Knudsen | Self::Pem | Self::Subid => past + future.unwrap_or(past + 2),
+            Self::Knudsen | Self::Pem | Self::Subid => {
+                past.saturating_add(future.unwrap_or(past.saturating_add(2)))
+            }
         }
     }
 

@@ -82,7 +82,7 @@ impl Stochastic {
     pub fn lags(self, past: usize, future: Option<usize>) -> usize {
         match self {
             Self::Innovations => past,
-            Self::FirstColumn | Self::Cholesky => past + future.unwrap_or(past),
+            Self::FirstColumn | Self::Cholesky => past.saturating_add(future.unwrap_or(past)),
         }
     }
 
