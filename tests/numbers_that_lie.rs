@@ -240,7 +240,7 @@ fn kinds() -> Vec<Kind> {
     let wide = modal(12, 8, 2);
     add(
         "12 outputs from 8 inputs",
-        Must::Trust,
+        Must::BeHonest,
         2,
         &wide,
         &SPREAD,

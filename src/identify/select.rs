@@ -12,6 +12,7 @@ use super::order::{self, OrderEvidence};
 use super::pbsid_opt::{Weight, decompose};
 use super::polish::Effort;
 use super::source::Source;
+use super::truncation::LARGEST_FOR_POLISH;
 use super::varx::Varx;
 use crate::linalg::spectral_radius;
 use crate::moments::RFactor;
@@ -410,6 +411,25 @@ fn choose_order(
                 .to_owned()
         };
         return Ok((order, format!("order {order}: {reason}")));
+    }
+    // Where the past window cuts off too much, the cost holds that as well, and the test says nothing about the order.
+    let cut_off = estimator.candidate(start)?.truncation;
+    if cut_off > LARGEST_FOR_POLISH {
+        for order in start + 1..=(start + order::ORDERS_ABOVE).min(largest) {
+            test(evidence, estimator, order)?;
+            match find(evidence, order) {
+                Some(more) if more.schwarz < best.schwarz => best = more,
+                _ => break,
+            }
+        }
+        return Ok((
+            best.order,
+            format!(
+                "order {}: smallest Schwarz criterion; the past window cuts off too much (truncation {cut_off:.1}) for \
+                 the chi-square test to tell",
+                best.order
+            ),
+        ));
     }
     let last = if start < proposal {
         start

@@ -40,9 +40,15 @@ pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Option
         && let Some(p) = test.p_value
         && p < REFEREE_LEVEL
     {
+        let cut_off = summary.diagnostics.truncation.unwrap_or(f64::INFINITY) > LARGEST_FOR_POLISH;
+        let or_window = if cut_off {
+            ", or the past window is too short"
+        } else {
+            ""
+        };
         out.push(format!(
             "a linear model of order {} does not explain the recording (chi-square {:.0} with {} degrees of freedom, \
-             p = {p:.1e}): the order is too low, or the plant is not linear; the covariance is optimistic, \
+             p = {p:.1e}): the order is too low, or the plant is not linear{or_window}; the covariance is optimistic, \
              --covariance robust is not",
             summary.order, test.chi_square, test.degrees_of_freedom
         ));
