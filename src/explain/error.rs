@@ -1,10 +1,20 @@
 //! What can be wrong with a question to `explain`.
 
+use crate::log::LogError;
+
 /// Why there is no answer. Messages are worded for the command line.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages explain the fields")]
 pub enum ExplainError {
+    /// What was given is no recording, or not of the same plant.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// Nothing to answer to, or nothing that answers.
+    #[error(
+        "{recording}: explain needs at least one input and one output; name the columns with --inputs and --outputs"
+    )]
+    NoChannels { recording: String },
     /// No recording was given.
     #[error("explain needs at least one recording")]
     NoRecording,

@@ -50,6 +50,15 @@ const UNDERSTOOD: f64 = 0.5;
 pub(crate) fn know(recordings: &[Log], simulation: &Simulation) -> Result<Known, ExplainError> {
     let first = recordings.first().ok_or(ExplainError::NoRecording)?;
     for log in recordings {
+        log.check()?;
+        first.check_same_kind(log)?;
+    }
+    if first.inputs.is_empty() || first.outputs.is_empty() {
+        return Err(ExplainError::NoChannels {
+            recording: first.name.clone(),
+        });
+    }
+    for log in recordings {
         for (channel, y) in log.outputs.iter().zip(&log.output_data) {
             if y.iter().all(|v| *v == y[0]) {
                 return Err(ExplainError::Constant {
@@ -62,6 +71,7 @@ pub(crate) fn know(recordings: &[Log], simulation: &Simulation) -> Result<Known,
     let known = match simulation {
         Simulation::Model(model, name) => of_model(recordings, model, name)?,
         Simulation::Outputs(logs) => {
+            logs.iter().try_for_each(Log::check)?;
             check_outputs(recordings, logs)?;
             of_outputs(recordings, logs)?
         }

@@ -53,6 +53,9 @@ pub enum IdentifyError {
         /// Samples needed.
         needed: usize,
     },
+    /// Nothing to model.
+    #[error("the recording has no output; name at least one column with --outputs")]
+    NoOutput,
     /// A channel that never changes.
     #[error(
         "{role} '{name}' is constant{place}: it carries no information; leave it out with --inputs and --outputs"

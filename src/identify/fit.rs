@@ -158,6 +158,9 @@ pub(super) fn lags_needed(
     inputs: usize,
     outputs: usize,
 ) -> Result<usize, IdentifyError> {
+    if outputs == 0 {
+        return Err(IdentifyError::NoOutput);
+    }
     let q = inputs + outputs;
     check_windows(options, q, outputs)?;
     let longest = longest_past(options, q);
@@ -188,19 +191,19 @@ fn check_windows(options: &Options, q: usize, outputs: usize) -> Result<(), Iden
     {
         return wrong("the future window cannot be longer than the past window".to_owned());
     }
-    if let Some(past) = past
-        && (past.saturating_add(1)).saturating_mul(q) > LARGEST_FACTOR
-    {
-        return wrong(format!(
-            "the data factor would have (past + 1) x {q} channels = {} columns; the limit is {LARGEST_FACTOR} \
-             ({:.1} GB); lower --past",
-            (past.saturating_add(1)).saturating_mul(q),
-            (LARGEST_FACTOR * LARGEST_FACTOR * 8) as f64 / 1e9
-        ));
+    for (flag, window) in [("past", past), ("future", future)] {
+        let columns = window.map_or(0, |window| window.saturating_add(1).saturating_mul(q));
+        if columns > LARGEST_FACTOR {
+            return wrong(format!(
+                "the data factor would have ({flag} + 1) x {q} channels = {columns} columns; the limit is \
+                 {LARGEST_FACTOR} ({:.1} GB); lower --{flag}",
+                (LARGEST_FACTOR * LARGEST_FACTOR * 8) as f64 / 1e9
+            ));
+        }
     }
     let largest = match (past, future) {
-        (_, Some(future)) => Some(future * outputs),
-        (Some(past), None) => Some(past * outputs),
+        (_, Some(future)) => Some(future.saturating_mul(outputs)),
+        (Some(past), None) => Some(past.saturating_mul(outputs)),
         (None, None) => None,
     };
     let orders: Vec<usize> = match &options.order {
@@ -265,7 +268,7 @@ fn choose_past(
     let preferred = options
         .method
         .smallest_past(outputs, options.order.largest());
-    if smallest > limit || smallest * (q + 1) + outputs >= data.samples {
+    if smallest > limit || smallest.saturating_mul(q + 1) + outputs >= data.samples {
         let order = options.order.largest();
         // The past window that the recording allows, with more windows than regressors.
         let largest = (data.samples.saturating_sub(outputs + 1) / (q + 1)).min(longest);

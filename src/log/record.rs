@@ -115,49 +115,64 @@ impl Log {
         input_data: Vec<Vec<f64>>,
         output_data: Vec<Vec<f64>>,
     ) -> Result<Self, LogError> {
+        let log = Self {
+            name: name.to_owned(),
+            sample_time,
+            start_time: 0.0,
+            inputs,
+            outputs,
+            input_data,
+            output_data,
+            sha256: None,
+        };
+        log.check()?;
+        Ok(log)
+    }
+
+    /// Whether this is a recording: its fields are open to be changed.
+    ///
+    /// # Errors
+    /// As [`Log::from_columns`].
+    pub fn check(&self) -> Result<(), LogError> {
+        let sample_time = self.sample_time;
         if !(sample_time.is_finite() && sample_time > 0.0) {
             return Err(LogError::InvalidSampleTime { sample_time });
         }
-        let name = name.to_owned();
         for (role, channels, data) in [
-            ("input", &inputs, &input_data),
-            ("output", &outputs, &output_data),
+            ("input", &self.inputs, &self.input_data),
+            ("output", &self.outputs, &self.output_data),
         ] {
             let (expected, found) = (channels.len(), data.len());
             if expected != found {
                 return Err(LogError::ColumnCount {
-                    name,
+                    name: self.name.clone(),
                     role,
                     expected,
                     found,
                 });
             }
         }
-        let columns = || {
-            inputs
-                .iter()
-                .chain(&outputs)
-                .zip(input_data.iter().chain(&output_data))
-        };
-        let expected = columns().next().map_or(0, |(_, column)| column.len());
+        let expected = self.samples();
         if expected == 0 {
-            return Err(LogError::too_short(&name, 0, 1, "a recording"));
+            return Err(LogError::too_short(&self.name, 0, 1, "a recording"));
         }
-        for (channel, data) in columns() {
-            let (column, found) = (channel.to_string(), data.len());
-            if found != expected {
+        for (channel, data) in self
+            .inputs
+            .iter()
+            .chain(&self.outputs)
+            .zip(self.channel_data())
+        {
+            let (name, column) = (self.name.clone(), channel.to_string());
+            if data.len() != expected {
                 return Err(LogError::ColumnLength {
                     name,
                     column,
                     expected,
-                    found,
+                    found: data.len(),
                 });
             }
-            if let Some((sample, value)) = data
-                .iter()
-                .enumerate()
-                .find(|(_, value)| !value.is_finite())
-            {
+            let stray = data.iter().enumerate().find(|(_, v)| !v.is_finite());
+            if let Some((sample, value)) = stray {
                 return Err(LogError::ColumnNotFinite {
                     name,
                     column,
@@ -166,16 +181,7 @@ impl Log {
                 });
             }
         }
-        Ok(Self {
-            name,
-            sample_time,
-            start_time: 0.0,
-            inputs,
-            outputs,
-            input_data,
-            output_data,
-            sha256: None,
-        })
+        Ok(())
     }
 
     /// Number of samples N.

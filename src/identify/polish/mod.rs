@@ -27,8 +27,14 @@ use crate::linalg::{LinalgError, all_finite, cholesky_upper, multiply_nt, solve_
 use crate::model::StateSpace;
 
 /// The iteration ends when a step promises less than this in the cost, which is in units of chi-square: the
-/// parameters are then within 1e-6 standard deviations of the minimum, whatever start they came from.
-const DECREASE: f64 = 1e-12;
+/// parameters are then within 1e-10 standard deviations of the minimum, whatever start they came from.
+const DECREASE: f64 = 1e-20;
+/// Of steps that promise less than this, the costs differ by little more than their rounding (1e-16 of a cost of 100 is
+/// 1e-14): choosing among them would be chance, and two starts that differ by rounding would end 1e-6 standard deviations
+/// apart. From here on the plain step is taken, as long as each promises less than the one before.
+const PLAIN: f64 = 1e-10;
+/// The referee of an order needs no more.
+const REFEREE_DECREASE: f64 = 1e-12;
 /// A Gauss-Newton iteration that has not ended by then will not.
 const ITERATIONS: usize = 60;
 /// Steps of which the one that decreases the cost most is taken: length of the step, and Levenberg-Marquardt
@@ -45,6 +51,8 @@ pub(super) const TRIES: [(f64, f64); 9] = [
     (1.0, 1e-1),
     (1.0, 1.0),
 ];
+/// A plain step that promises more than this share of the one before gets no nearer.
+const STALLED: f64 = 0.9;
 /// Steps in a row that each gain less than [`GAIN`] end the iteration: a flat valley, where the cost, and
 /// with it every prediction, no longer changes.
 const FLAT_STEPS: usize = 3;
@@ -114,6 +122,7 @@ pub fn polish(
     let degrees_of_freedom = (layout.outputs * varx.regressors()).saturating_sub(rank);
     let hopeless = HOPELESS * degrees_of_freedom as f64;
     let mut converged = false;
+    let mut promised = f64::INFINITY;
     let covariance = loop {
         let jacobian = problem.jacobian(&system);
         if !all_finite(&jacobian) {
@@ -127,7 +136,11 @@ pub fn polish(
             None => DMatrix::zeros(0, layout.len()),
         };
         let linearised = linearise(jacobian, residual.as_slice(), rank, &boundary)?;
-        if linearised.decrease() < DECREASE || flat == FLAT_STEPS {
+        let before = std::mem::replace(&mut promised, linearised.decrease());
+        let plain = promised < PLAIN && effort == Effort::Full && largest_radius.is_none();
+        let enough = if plain { DECREASE } else { REFEREE_DECREASE };
+        // Plain steps that no longer shrink have met the rounding of the residual.
+        if promised < enough || flat == FLAT_STEPS || (plain && promised > STALLED * before) {
             converged = true;
             break linearised.covariance();
         }
@@ -136,6 +149,18 @@ pub fn polish(
         }
         iterations += 1;
         let theta = layout.pack(&system);
+        if plain {
+            let step = linearised.step(0.0);
+            let moved: Vec<f64> = theta.iter().zip(step.iter()).map(|(v, s)| v + s).collect();
+            let candidate = layout.unpack(&moved, &system);
+            let candidate_cost = problem.cost(&candidate);
+            if !candidate_cost.is_finite() {
+                converged = true;
+                break linearised.covariance();
+            }
+            (system, cost) = (candidate, candidate_cost);
+            continue;
+        }
         // A cost is cheap beside a Jacobian: try all, take the best.
         let better = TRIES
             .iter()

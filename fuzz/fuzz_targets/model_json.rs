@@ -1,0 +1,7 @@
+#![no_main]
+
+#[allow(dead_code, unused_imports, reason = "each target is one of five")]
+#[path = "../../tests/hostile/mod.rs"]
+mod hostile;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| hostile::model_json(bytes));
