@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::augmented::AugmentedError;
+use super::data::deviation;
 use super::explanation::{AugmentedModel, StatePrior};
 
 /// Samples that an initial state is estimated from, at most.
@@ -58,7 +59,10 @@ impl AugmentedModel {
         }
         let samples = length.min(most);
         let inputs: Vec<&[f64]> = inputs.iter().map(|u| &u[..samples]).collect();
-        let scale: Vec<f64> = outputs.iter().map(|y| deviation(&y[..samples])).collect();
+        let scale: Vec<f64> = outputs
+            .iter()
+            .map(|y| deviation(y[..samples].iter()))
+            .collect();
         let prior = self.prior(&scale)?;
         let error = |x: &DVector<f64>| -> Result<DVector<f64>, AugmentedError> {
             let y = self.run(&inputs, Some(x.as_slice()))?;
@@ -145,15 +149,6 @@ impl StatePrior {
                 what: "the covariance of the initial state is not positive definite".to_owned(),
             })
     }
-}
-
-/// Standard deviation of an output, not zero.
-fn deviation(y: &[f64]) -> f64 {
-    let n = y.len().max(1) as f64;
-    let mean = y.iter().sum::<f64>() / n;
-    (y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n)
-        .sqrt()
-        .max(1e-12)
 }
 
 /// Scaled errors of the outputs from an initial state.
