@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
-# Fuzzes the targets of this folder one after the other, under the address sanitizer and led by coverage.
+# Fuzzes the targets of this folder one after the other, led by coverage, with integer overflow and debug assertions checked.
 #
 #   bash fuzz/run.sh [SECONDS] [TARGET...]     default: 600 seconds each of all five
 #
 # Installs cargo-fuzz where it is missing, and needs a nightly toolchain (`rustup toolchain install nightly`). Corpus and
-# findings stay in fuzz/corpus and fuzz/artifacts; a finding is run again with `cargo +nightly fuzz run TARGET FILE`.
-# INNOVANT_FUZZ_SANITIZER=none builds faster, but then no single allocation is bounded.
+# findings stay in fuzz/corpus and fuzz/artifacts; a finding is run again with
+# `cargo +nightly fuzz run --sanitizer none TARGET FILE`.
+# INNOVANT_FUZZ_SANITIZER=address looks into dependencies too (nothing here is `unsafe`); it takes much longer to build.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -19,26 +20,23 @@ if [[ ${#targets[@]} -eq 0 ]]; then
     targets=(csv_reader model_json explanation_json identify explain)
 fi
 
-# The inputs are at most 4 KB, and what they stand for is at most 2 MB of text or 200 samples of 4 channels. What they may
-# ask for is bounded by the automatic limits of the windows: moments of 250 lags of 4 channels, whose Gram matrix takes
-# (251 x 4)^2 x 8 bytes = 8 MB, and a few of it at once.
-largest_allocation_mb=256
-# All of them together, with the sanitizer's shadow and quarantine.
-memory_mb=2048
+# What a target may hold is bounded by its allocator (bound.rs). On top come code, corpus and coverage of libFuzzer.
+allocations_mb=256
+process_mb=1024
 
 if ! cargo fuzz --version >/dev/null 2>&1; then
     cargo install cargo-fuzz --locked
 fi
 
-# A log that is explained takes a second without the sanitizer, ten with it.
+# Longest time that one input may take, in seconds: a hundred times what it takes without instrumentation, and more for a
+# log that is explained, where that is a second.
 declare -A longest=([csv_reader]=10 [model_json]=10 [explanation_json]=20 [identify]=30 [explain]=120)
 
 # One thread: what is found is found again.
 export RAYON_NUM_THREADS=1
 for target in "${targets[@]}"; do
     echo "$target: $seconds s"
-    cargo +nightly fuzz run "$target" --sanitizer "${INNOVANT_FUZZ_SANITIZER:-address}" -- \
+    cargo +nightly fuzz run "$target" --sanitizer "${INNOVANT_FUZZ_SANITIZER:-none}" -- \
         -max_total_time="$seconds" -timeout="${longest[$target]}" -max_len=4096 \
-        -rss_limit_mb=$memory_mb -malloc_limit_mb=$largest_allocation_mb \
-        -jobs=0 -print_final_stats=1
+        -rss_limit_mb=$process_mb -malloc_limit_mb=$allocations_mb -print_final_stats=1
 done

@@ -57,13 +57,12 @@ fn the_unit_of_time_scales_the_poles() {
             assert_eq!(model.system.a, seconds.system.a, "{method:?}");
             assert_eq!(model.system.k, seconds.system.k, "{method:?}");
             assert_eq!(model.covariance, seconds.covariance, "{method:?}");
-            let poles = |m: &Model| {
-                pole_uncertainties(&m.system, m.covariance.as_ref().unwrap()).unwrap()
-            };
+            let poles =
+                |m: &Model| pole_uncertainties(&m.system, m.covariance.as_ref().unwrap()).unwrap();
             for (a, b) in poles(&model).iter().zip(poles(&seconds)) {
                 let frequency = a.pole.natural_frequency * unit / b.pole.natural_frequency;
-                let deviation = a.natural_frequency_std.unwrap() * unit
-                    / b.natural_frequency_std.unwrap();
+                let deviation =
+                    a.natural_frequency_std.unwrap() * unit / b.natural_frequency_std.unwrap();
                 assert!((frequency - 1.0).abs() < 1e-12, "{frequency}");
                 assert!((deviation - 1.0).abs() < 1e-12, "{deviation}");
                 assert_eq!(a.pole.damping, b.pole.damping);
@@ -207,11 +206,17 @@ fn files_are_what_they_hold() {
     std::fs::remove_file(copy).unwrap();
     let source = Source::from(file.path().to_path_buf());
     let read = Log::read(&source, &Roles::default()).unwrap();
-    assert_eq!((&read.input_data, &read.output_data), (&log.input_data, &log.output_data));
+    assert_eq!(
+        (&read.input_data, &read.output_data),
+        (&log.input_data, &log.output_data)
+    );
     let mut streamed = FileRecords::open(vec![source], Roles::default()).unwrap();
     let options = Options::default();
     let of_stream = identify_records(&mut streamed, &options).unwrap();
-    assert_eq!(document(&of_stream), document(&identify(&[read], &options).unwrap()));
+    assert_eq!(
+        document(&of_stream),
+        document(&identify(&[read], &options).unwrap())
+    );
 }
 
 /// The number of threads does not change a digit.
@@ -224,7 +229,10 @@ fn threads_do_not_matter() {
     };
     for options in METHODS.map(options_of).into_iter().chain([robust]) {
         let [one, two] = [1, 2].map(|threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
             pool.install(|| document(&identify(std::slice::from_ref(&log), &options).unwrap()))
         });
         assert_eq!(one, two, "{:?}", options.method);

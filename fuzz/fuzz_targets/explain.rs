@@ -1,5 +1,7 @@
 #![no_main]
 
+#[path = "../bound.rs"]
+mod bound;
 #[allow(dead_code, unused_imports, reason = "each target is one of five")]
 #[path = "../../tests/hostile/mod.rs"]
 mod hostile;

@@ -12,7 +12,7 @@ use super::functionals::Functionals;
 use super::plant::{Plant, row_major};
 use super::simulation::delayed;
 use super::structure::{Direction, Instance, Signal, Structure};
-use crate::log::Channel;
+use crate::log::{Channel, is_sample_time};
 use crate::report::Rows;
 
 /// Why an augmented model cannot be run.
@@ -234,8 +234,8 @@ impl AugmentedModel {
                 super::finer::MOST_STEPS
             )));
         }
-        if !(self.sample_time.is_finite() && self.sample_time > 0.0) {
-            return Err(damaged("the sample time is not positive"));
+        if !is_sample_time(self.sample_time) {
+            return Err(damaged("the sample time is no positive number of seconds"));
         }
         if self.input_delays.len() != self.inputs.len() {
             return Err(damaged("there is not one delay for each input"));

@@ -248,7 +248,8 @@ pub enum LogError {
     },
     /// The sample time asked for is zero, negative or not finite.
     #[error(
-        "the sample time must be a positive number of seconds, found {sample_time}; for example `--dt 0.01`"
+        "the sample time must be a positive number of seconds, between 1e-18 and 1e18, found {sample_time}; for example \
+         `--dt 0.01`"
     )]
     InvalidSampleTime { sample_time: f64 },
     /// Experiments that belong together have other channels.

@@ -60,6 +60,7 @@ pub use reader::{
 };
 pub use record::Log;
 pub use roles::{RoleNeed, Roles};
+pub use sampling::is_sample_time;
 pub use source::Source;
 pub use table::{TableRoles, time_base_of};
 pub use writer::{CsvWriter, write_table};

@@ -7,6 +7,7 @@ use super::channel::Channel;
 use super::error::LogError;
 use super::reader::{Block, LogReader, check_same_channels, check_same_sampling};
 use super::roles::{RoleNeed, Roles};
+use super::sampling::is_sample_time;
 use super::source::Source;
 use super::writer::write_table;
 
@@ -135,7 +136,7 @@ impl Log {
     /// As [`Log::from_columns`].
     pub fn check(&self) -> Result<(), LogError> {
         let sample_time = self.sample_time;
-        if !(sample_time.is_finite() && sample_time > 0.0) {
+        if !is_sample_time(sample_time) {
             return Err(LogError::InvalidSampleTime { sample_time });
         }
         for (role, channels, data) in [

@@ -3,6 +3,7 @@
 use super::channel::Channel;
 use super::error::LogError;
 use super::header::Header;
+use super::sampling::is_sample_time;
 
 /// What the user asked for: `--inputs`, `--outputs`, `--time`, `--dt`. The default leaves all to the headers.
 ///
@@ -57,10 +58,7 @@ pub(super) struct Assigned {
 
 /// Finds the columns that `roles` and `need` ask for.
 pub(super) fn assign(roles: &Roles, need: RoleNeed, header: &Header) -> Result<Assigned, LogError> {
-    if let Some(sample_time) = roles
-        .sample_time
-        .filter(|dt| !(dt.is_finite() && *dt > 0.0))
-    {
+    if let Some(sample_time) = roles.sample_time.filter(|dt| !is_sample_time(*dt)) {
         return Err(LogError::InvalidSampleTime { sample_time });
     }
     let asked_time = roles

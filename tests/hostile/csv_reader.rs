@@ -11,9 +11,46 @@ use super::sound;
 
 /// Text that means something to the reader.
 const WORDS: [&str; 40] = [
-    "t,u,y\n", "0,1,2\n", "1,2,3\n", "2,-1,0.5\n", ",", ";", "\t", "\n", "\r", "\r\n", "\"", "\"\"", " ", "#", "[", "]",
-    "t [ms]", "time", "u", "y", "u1", "y2 [rad/s]", "0", "-1", "1e5", "1e400", "1e-400", "NaN", "inf", ".", "-", "+",
-    "0x10", "1,5", "\u{feff}", "\u{0}", "é", "12345678901234567890", "0.1\n", "1:00:00",
+    "t,u,y\n",
+    "0,1,2\n",
+    "1,2,3\n",
+    "2,-1,0.5\n",
+    ",",
+    ";",
+    "\t",
+    "\n",
+    "\r",
+    "\r\n",
+    "\"",
+    "\"\"",
+    " ",
+    "#",
+    "[",
+    "]",
+    "t [ms]",
+    "time",
+    "u",
+    "y",
+    "u1",
+    "y2 [rad/s]",
+    "0",
+    "-1",
+    "1e5",
+    "1e400",
+    "1e-400",
+    "NaN",
+    "inf",
+    ".",
+    "-",
+    "+",
+    "0x10",
+    "1,5",
+    "\u{feff}",
+    "\u{0}",
+    "é",
+    "12345678901234567890",
+    "0.1\n",
+    "1:00:00",
 ];
 
 /// How a piece of the file is made.
@@ -21,7 +58,9 @@ fn text(bytes: &mut Bytes) -> Vec<u8> {
     let mut text = Vec::new();
     while !bytes.is_empty() {
         match bytes.byte() {
-            word @ 0..=159 => text.extend_from_slice(WORDS[usize::from(word) % WORDS.len()].as_bytes()),
+            word @ 0..=159 => {
+                text.extend_from_slice(WORDS[usize::from(word) % WORDS.len()].as_bytes())
+            }
             // A long run of one thing: fields, digits, rows.
             160..=175 => {
                 let word = bytes.one_of(&WORDS);
@@ -31,7 +70,9 @@ fn text(bytes: &mut Bytes) -> Vec<u8> {
             176..=207 => {
                 let (rows, step) = (usize::from(bytes.byte()), bytes.finite());
                 for k in 0..rows {
-                    text.extend_from_slice(format!("{},{},{}\n", step * k as f64, k % 7, k % 3).as_bytes());
+                    text.extend_from_slice(
+                        format!("{},{},{}\n", step * k as f64, k % 7, k % 3).as_bytes(),
+                    );
                 }
             }
             208..=231 => text.extend_from_slice(bytes.number().to_string().as_bytes()),
@@ -63,9 +104,16 @@ pub fn csv_reader(bytes: &[u8]) {
         RoleNeed::OutputsOnly,
         RoleNeed::InputsAndMaybeOutputs,
     ]);
-    let mut file = if kind & 1 == 0 { bytes.rest().to_vec() } else { text(&mut bytes) };
+    let mut file = if kind & 1 == 0 {
+        bytes.rest().to_vec()
+    } else {
+        text(&mut bytes)
+    };
     if kind & 2 == 2 {
-        let utf16: Vec<u8> = String::from_utf8_lossy(&file).encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let utf16: Vec<u8> = String::from_utf8_lossy(&file)
+            .encode_utf16()
+            .flat_map(u16::to_le_bytes)
+            .collect();
         file = [vec![0xFF, 0xFE], utf16].concat();
     }
     if kind & 4 == 4 {
@@ -93,7 +141,9 @@ fn roles(bytes: &mut Bytes) -> Roles {
     let names = ["u", "y", "u1", "1", "2", "t", "", "Y2 [rad/s]", "[", "time"];
     let list = |bytes: &mut Bytes| {
         let count = bytes.below(4);
-        (0..count).map(|_| bytes.one_of(&names).to_owned()).collect()
+        (0..count)
+            .map(|_| bytes.one_of(&names).to_owned())
+            .collect()
     };
     if bytes.byte() < 160 {
         return Roles::default();
@@ -111,7 +161,8 @@ fn read(reader: impl Read + Send + 'static, roles: &Roles, need: RoleNeed) -> Re
     let collected = opened.and_then(|mut reader| {
         // After its end or an error a reader gives nothing more.
         let mut block = Block::new();
-        let mut columns: Vec<Vec<f64>> = vec![Vec::new(); reader.inputs().len() + reader.outputs().len()];
+        let mut columns: Vec<Vec<f64>> =
+            vec![Vec::new(); reader.inputs().len() + reader.outputs().len()];
         loop {
             match reader.next_block(&mut block) {
                 Ok(true) => {}

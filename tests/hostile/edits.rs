@@ -14,7 +14,10 @@ fn places(value: &Value) -> Vec<Vec<String>> {
             path.pop();
         };
         match value {
-            Value::Array(list) => list.iter().enumerate().for_each(|(i, v)| below(i.to_string(), v)),
+            Value::Array(list) => list
+                .iter()
+                .enumerate()
+                .for_each(|(i, v)| below(i.to_string(), v)),
             Value::Object(map) => map.iter().for_each(|(k, v)| below(k.clone(), v)),
             _ => {}
         }
@@ -92,7 +95,8 @@ fn edit(document: &mut Value, bytes: &mut Bytes) {
             }
         }
         (8, Value::Number(number)) => {
-            let scaled = number.as_f64().unwrap_or(1.0) * 10_f64.powi(i32::from(bytes.byte() as i8));
+            let scaled =
+                number.as_f64().unwrap_or(1.0) * 10_f64.powi(i32::from(bytes.byte() as i8));
             *number = serde_json::Number::from_f64(scaled).unwrap_or_else(|| 0.into());
         }
         (_, here) => *here = value(bytes),
@@ -102,8 +106,22 @@ fn edit(document: &mut Value, bytes: &mut Bytes) {
 /// One edit of the text: what no tree can say.
 fn scratch(text: &mut Vec<u8>, bytes: &mut Bytes) {
     const PIECES: [&str; 16] = [
-        "NaN", "Infinity", "1e999", "-1e999", "1e-999", "-0.0", "\u{feff}", "\u{0}", "\"", "\\u0000", "{", "]", ",", "\n",
-        "\"A\":1,", "\"sample_time\":2,",
+        "NaN",
+        "Infinity",
+        "1e999",
+        "-1e999",
+        "1e-999",
+        "-0.0",
+        "\u{feff}",
+        "\u{0}",
+        "\"",
+        "\\u0000",
+        "{",
+        "]",
+        ",",
+        "\n",
+        "\"A\":1,",
+        "\"sample_time\":2,",
     ];
     let place = bytes.below(text.len() + 1);
     match bytes.below(5) {
@@ -115,8 +133,16 @@ fn scratch(text: &mut Vec<u8>, bytes: &mut Bytes) {
         // The number that begins next becomes another.
         2 => {
             let digit = |b: &u8| b.is_ascii_digit() || b"+-.eE".contains(b);
-            let from = place + text[place..].iter().position(digit).unwrap_or(text.len() - place);
-            let to = from + text[from..].iter().position(|b| !digit(b)).unwrap_or(text.len() - from);
+            let from = place
+                + text[place..]
+                    .iter()
+                    .position(digit)
+                    .unwrap_or(text.len() - place);
+            let to = from
+                + text[from..]
+                    .iter()
+                    .position(|b| !digit(b))
+                    .unwrap_or(text.len() - from);
             let number = match bytes.below(4) {
                 0 => "9".repeat(1 << (bytes.byte() % 17)),
                 1 => format!("0.{}1", "0".repeat(1 << (bytes.byte() % 12))),
@@ -127,7 +153,10 @@ fn scratch(text: &mut Vec<u8>, bytes: &mut Bytes) {
         }
         3 => {
             let piece = bytes.one_of(&["[", "{\"a\":", "[[", "\"", " "]);
-            text.splice(place..place, piece.repeat(1 << (bytes.byte() % 15)).into_bytes());
+            text.splice(
+                place..place,
+                piece.repeat(1 << (bytes.byte() % 15)).into_bytes(),
+            );
         }
         _ => {
             if let Some(byte) = text.get_mut(place) {

@@ -15,7 +15,10 @@ use super::{explanation_json, sound};
 /// written and simulated on, or a reason.
 pub fn explain_log(bytes: &[u8]) {
     let mut bytes = Bytes::new(bytes);
-    let (inputs, outputs) = (bytes.one_of(&[1, 1, 1, 2, 0]), bytes.one_of(&[1, 1, 1, 2, 0]));
+    let (inputs, outputs) = (
+        bytes.one_of(&[1, 1, 1, 2, 0]),
+        bytes.one_of(&[1, 1, 1, 2, 0]),
+    );
     let samples = match bytes.byte() {
         // Enough to be explained, mostly.
         0..=223 => 150 + bytes.below(MOST_SAMPLES - 149),
@@ -32,7 +35,10 @@ pub fn explain_log(bytes: &[u8]) {
             .collect(),
         seed: u64::from(bytes.byte()),
     };
-    let plant = bytes.flag().then(|| plant(&mut bytes, inputs, outputs, time)).flatten();
+    let plant = bytes
+        .flag()
+        .then(|| plant(&mut bytes, inputs, outputs, time))
+        .flatten();
     let mut log = match log(&mut bytes, inputs, outputs, samples, time) {
         Ok(log) => log,
         Err(error) => return sound::refusal(&error),
@@ -47,7 +53,10 @@ pub fn explain_log(bytes: &[u8]) {
         }
         None => {
             let columns = super::logs::columns(&mut bytes, outputs, samples);
-            let given = Log { output_data: columns, ..log.clone() };
+            let given = Log {
+                output_data: columns,
+                ..log.clone()
+            };
             Simulation::Outputs(vec![given])
         }
     };
@@ -78,7 +87,9 @@ fn plant(bytes: &mut Bytes, inputs: usize, outputs: usize, sample_time: f64) -> 
     let document = json!({
         "A": matrix(n, n, 1.0), "B": matrix(n, inputs, 4.0), "C": matrix(outputs, n, 4.0), "dt": sample_time,
     });
-    parse_model("model.json", &document.to_string()).ok().map(|read| read.model)
+    parse_model("model.json", &document.to_string())
+        .ok()
+        .map(|read| read.model)
 }
 
 /// Replaces the recorded outputs by the model's answer to the recorded inputs after a law that no model holds.
@@ -106,7 +117,12 @@ fn answer(log: &mut Log, model: &Model, bytes: &mut Bytes) {
     let samples = log.samples();
     let made: Vec<Vec<f64>> = outputs
         .into_iter()
-        .map(|y| y.iter().zip(white(9, samples)).map(|(y, e)| y + noise * e).collect())
+        .map(|y| {
+            y.iter()
+                .zip(white(9, samples))
+                .map(|(y, e)| y + noise * e)
+                .collect()
+        })
         .collect();
     if made.iter().flatten().all(|v: &f64| v.is_finite()) {
         log.output_data = made;

@@ -50,9 +50,13 @@ pub fn explanation(read: &Explanation) {
         sound::refusal(&error);
     }
     let model = &read.model;
-    let inputs: Vec<Vec<f64>> = (0..model.inputs.len()).map(|i| white(i as u64, SAMPLES)).collect();
+    let inputs: Vec<Vec<f64>> = (0..model.inputs.len())
+        .map(|i| white(i as u64, SAMPLES))
+        .collect();
     let columns: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
-    let outputs: Vec<Vec<f64>> = (0..model.outputs.len()).map(|i| white(7 + i as u64, SAMPLES)).collect();
+    let outputs: Vec<Vec<f64>> = (0..model.outputs.len())
+        .map(|i| white(7 + i as u64, SAMPLES))
+        .collect();
     let recorded: Vec<&[f64]> = outputs.iter().map(Vec::as_slice).collect();
     let start = match model.estimate_initial_state(&columns, &recorded) {
         Ok(start) => {
@@ -82,7 +86,10 @@ pub fn explanation(read: &Explanation) {
 fn refused(error: &AugmentedError) {
     sound::refusal(error);
     assert!(
-        matches!(error, AugmentedError::Diverges | AugmentedError::SimulationNeeded),
+        matches!(
+            error,
+            AugmentedError::Diverges | AugmentedError::SimulationNeeded
+        ),
         "accepted, and then: {error}"
     );
 }
@@ -93,12 +100,19 @@ fn dressed(document: &mut Value, bytes: &mut Bytes) {
         return;
     };
     let states = model.get("A").and_then(Value::as_array).map_or(0, Vec::len);
-    let outputs = model.get("outputs").and_then(Value::as_array).map_or(0, Vec::len);
+    let outputs = model
+        .get("outputs")
+        .and_then(Value::as_array)
+        .map_or(0, Vec::len);
     match bytes.below(6) {
         0..=2 => {
             let entries: Vec<_> = library().collect();
             let entry = entries[bytes.below(entries.len())];
-            let direction = if entry.port() == Port::Force { states } else { 0 };
+            let direction = if entry.port() == Port::Force {
+                states
+            } else {
+                0
+            };
             let coefficients = bytes.one_of(&[0, 2 * outputs, states, 2 * states]);
             let looks_at = match bytes.below(6) {
                 0 => json!({"integral": bytes.below(2)}),
@@ -133,7 +147,11 @@ fn dressed(document: &mut Value, bytes: &mut Bytes) {
         }
         3 => {
             let covariance: Vec<Vec<f64>> = (0..states)
-                .map(|i| (0..states).map(|j| if i == j { bytes.finite() } else { 0.0 }).collect())
+                .map(|i| {
+                    (0..states)
+                        .map(|j| if i == j { bytes.finite() } else { 0.0 })
+                        .collect()
+                })
                 .collect();
             let mean: Vec<f64> = (0..states).map(|_| bytes.finite()).collect();
             model.insert(

@@ -33,9 +33,20 @@ pub fn run(logs: &[Log], options: &Options) {
         Ok(model) => {
             let numbers = |m: &nalgebra::DMatrix<f64>| m.iter().all(|v| v.is_finite());
             assert!(model.innovation_covariance.as_ref().is_some_and(numbers));
-            assert!(model.covariance.as_ref().is_some_and(|c| numbers(&c.matrix)));
+            assert!(
+                model
+                    .covariance
+                    .as_ref()
+                    .is_some_and(|c| numbers(&c.matrix))
+            );
             assert!(model.initial_state.iter().all(|v| v.is_finite()));
-            assert!(model.inputs.iter().chain(&model.outputs).all(|c| c.level.is_finite()));
+            assert!(
+                model
+                    .inputs
+                    .iter()
+                    .chain(&model.outputs)
+                    .all(|c| c.level.is_finite())
+            );
             assert!(model.summary.is_some());
             sound::model(&model);
         }

@@ -64,17 +64,23 @@ fn column(bytes: &mut Bytes, before: &[Vec<f64>], samples: usize) -> Vec<f64> {
         }
         (7, _) => {
             let (at, size) = (bytes.below(MOST_SAMPLES), bytes.finite());
-            (0..samples).map(|k| if k < at { 0.0 } else { size }).collect()
+            (0..samples)
+                .map(|k| if k < at { 0.0 } else { size })
+                .collect()
         }
         (8, _) => {
             let (at, size) = (bytes.below(MOST_SAMPLES), bytes.number());
-            (0..samples).map(|k| if k == at { size } else { 0.0 }).collect()
+            (0..samples)
+                .map(|k| if k == at { size } else { 0.0 })
+                .collect()
         }
         (9, _) => {
             let turn = f64::from(bytes.byte()) / 40.0;
             (0..samples).map(|k| (turn * k as f64).sin()).collect()
         }
-        (10, _) => (0..samples).map(|_| f64::from(bytes.byte() as i8)).collect(),
+        (10, _) => (0..samples)
+            .map(|_| f64::from(bytes.byte() as i8))
+            .collect(),
         _ => {
             let values: Vec<f64> = (0..1 + bytes.below(8)).map(|_| bytes.number()).collect();
             (0..samples).map(|k| values[k % values.len()]).collect()
@@ -87,7 +93,9 @@ pub fn white(seed: u64, samples: usize) -> Vec<f64> {
     let mut state = seed.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     (0..samples)
         .map(|_| {
-            state = state.wrapping_mul(2_862_933_555_777_941_757).wrapping_add(1);
+            state = state
+                .wrapping_mul(2_862_933_555_777_941_757)
+                .wrapping_add(1);
             (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
         })
         .collect()
@@ -95,7 +103,9 @@ pub fn white(seed: u64, samples: usize) -> Vec<f64> {
 
 /// `u1`, `u2`, ...
 pub fn named(letter: char, count: usize) -> Vec<Channel> {
-    (1..=count).map(|i| Channel::new(format!("{letter}{i}"))).collect()
+    (1..=count)
+        .map(|i| Channel::new(format!("{letter}{i}")))
+        .collect()
 }
 
 /// A recording with so many channels, or why it is none.

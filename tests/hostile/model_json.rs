@@ -64,7 +64,11 @@ fn resize(document: &mut Value, bytes: &mut Bytes) {
             }
         }
         1 => {
-            let key = if document.get("dt").is_some() { "dt" } else { "sample_time" };
+            let key = if document.get("dt").is_some() {
+                "dt"
+            } else {
+                "sample_time"
+            };
             document[key] = json!(bytes.finite());
         }
         2 => {

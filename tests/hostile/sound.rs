@@ -42,7 +42,13 @@ pub fn model(model: &Model) {
     );
     assert_eq!((model.inputs.len(), model.outputs.len()), (r, l));
     assert_eq!(model.initial_state.len(), n);
-    for matrix in [&model.system.a, &model.system.b, &model.system.c, &model.system.d, &model.system.k] {
+    for matrix in [
+        &model.system.a,
+        &model.system.b,
+        &model.system.c,
+        &model.system.d,
+        &model.system.k,
+    ] {
         assert!(matrix.iter().all(|v| v.is_finite()));
     }
     match model.system.default_frequencies(5) {
