@@ -18,6 +18,15 @@ use proptest::sample::Index;
 /// 1e-6 reciprocal, mostly 1e-2) takes some of it, and the polish ends within 1e-10 standard deviations.
 const ROUNDING: f64 = 1e-8;
 
+/// By how many standard deviations a response may differ, and by what share its covariance: the prediction error method
+/// passes over all samples for each step, and ends within 1e-3 standard deviations of its minimum.
+fn ends_within(method: Method) -> (f64, f64) {
+    match method {
+        Method::Pem => (2e-3, 2e-3),
+        _ => (0.0, ROUNDING),
+    }
+}
+
 fn document(model: &Model) -> String {
     ModelDocument::new(model).unwrap().to_json().unwrap()
 }
@@ -106,12 +115,14 @@ proptest! {
             let (ga, gb, va, vb) = (response(&a), response(&b), covariance(&a), covariance(&b));
             for (i, from) in outputs.into_iter().enumerate() {
                 for (j, of) in inputs.into_iter().enumerate() {
-                    let error = (gb[(i, j)] - ga[(from, of)]).norm() / ga[(from, of)].norm();
-                    prop_assert!(error < ROUNDING, "{:?}: {:e}", method, error);
                     let (x, y) = (va[(from, of)], vb[(i, j)]);
                     let size = x[0][0] + x[1][1];
+                    let (deviations, share) = ends_within(method);
+                    let (apart, of) = ((gb[(i, j)] - ga[(from, of)]).norm(), ga[(from, of)].norm());
+                    let most = ROUNDING * of + deviations * size.sqrt();
+                    prop_assert!(apart < most, "{:?}: {:e} of {:e}", method, apart, of);
                     for (x, y) in x.as_flattened().iter().zip(y.as_flattened()) {
-                        prop_assert!((x - y).abs() < ROUNDING * size, "{:?}: {:e}", method, (x - y).abs() / size);
+                        prop_assert!((x - y).abs() < share * size, "{:?}: {:e}", method, (x - y).abs() / size);
                     }
                 }
             }

@@ -67,6 +67,16 @@ pub enum ExplainError {
         recorded: String,
         simulated: String,
     },
+    /// Numbers whose squares and products are none.
+    #[error(
+        "{recording}: {channel} moves by {size:e} and reaches {largest:e}; only sizes from 1e-60 to 1e60 are explained: give it in another unit"
+    )]
+    Size {
+        recording: String,
+        channel: String,
+        size: f64,
+        largest: f64,
+    },
     /// Too few samples.
     #[error(
         "{recording}: {samples} samples are too few: {needed} are needed to fit {states} states and still hold out blocks for the proof; record longer"

@@ -11,7 +11,7 @@ use super::fit::{Effort, Fit, Problem};
 use super::offset::operating_point;
 use super::plant::Plant;
 use super::rebaseline::{MOST_DELAY, rebaseline, shifted};
-use super::run::MOST_STATES;
+use super::run::{DIVERGED, MOST_STATES};
 use super::search::{Boring, single_effects};
 use super::structure::Structure;
 use crate::identify::Model;
@@ -68,10 +68,12 @@ pub(crate) fn know(recordings: &[Log], simulation: &Simulation) -> Result<Known,
             }
         }
     }
+    recordings.iter().try_for_each(check_sizes)?;
     let known = match simulation {
         Simulation::Model(model, name) => of_model(recordings, model, name)?,
         Simulation::Outputs(logs) => {
             logs.iter().try_for_each(Log::check)?;
+            logs.iter().try_for_each(check_sizes)?;
             check_outputs(recordings, logs)?;
             of_outputs(recordings, logs)?
         }
@@ -105,6 +107,28 @@ pub(crate) fn know(recordings: &[Log], simulation: &Simulation) -> Result<Known,
         });
     }
     Ok(known)
+}
+
+/// Refuses channels so large or so small that their squares and products leave the range of numbers. A channel that does
+/// not move at all is small in no unit.
+fn check_sizes(log: &Log) -> Result<(), ExplainError> {
+    let channels = log.inputs.iter().chain(&log.outputs);
+    for (channel, column) in channels.zip(log.channel_data()) {
+        let largest = column.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let first = column.first().copied().unwrap_or(0.0);
+        let size = column
+            .iter()
+            .fold(0.0_f64, |most, v| most.max((v - first).abs()));
+        if largest >= DIVERGED || (size > 0.0 && size < 1.0 / DIVERGED) {
+            return Err(ExplainError::Size {
+                recording: log.name.clone(),
+                channel: channel.name.clone(),
+                size,
+                largest,
+            });
+        }
+    }
+    Ok(())
 }
 
 /// "1 input", "2 inputs".

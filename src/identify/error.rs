@@ -54,8 +54,11 @@ pub enum IdentifyError {
         needed: usize,
     },
     /// Nothing to model.
-    #[error("the recording has no output; name at least one column with --outputs")]
-    NoOutput,
+    #[error("the recording has no {role}; name at least one column with --{role}s")]
+    NoChannel {
+        /// `input` or `output`.
+        role: &'static str,
+    },
     /// A channel that never changes.
     #[error(
         "{role} '{name}' is constant{place}: it carries no information; leave it out with --inputs and --outputs"

@@ -158,8 +158,10 @@ pub(super) fn lags_needed(
     inputs: usize,
     outputs: usize,
 ) -> Result<usize, IdentifyError> {
-    if outputs == 0 {
-        return Err(IdentifyError::NoOutput);
+    for (role, count) in [("input", inputs), ("output", outputs)] {
+        if count == 0 {
+            return Err(IdentifyError::NoChannel { role });
+        }
     }
     let q = inputs + outputs;
     check_windows(options, q, outputs)?;

@@ -94,13 +94,12 @@ fn select_by(
     let future_for_choice = options
         .future
         .unwrap_or_else(|| horizon::future_for_order_choice(past, outputs, largest));
-    let canonical = decompose(factor, varx, future_for_choice, Weight::Cva)?;
+    // A method may look further ahead than back; the singular values that orders are compared by do not.
+    let ahead = future_for_choice.min(past);
+    let canonical = decompose(factor, varx, ahead, Weight::Cva)?;
     let correlations =
         order::canonical_correlations(&canonical.svd.singular_values, factor.columns);
-    let possible = canonical
-        .svd
-        .largest_order()
-        .min(future_for_choice * outputs);
+    let possible = canonical.svd.largest_order().min(ahead * outputs);
     let mut evidence = order::singular_value_criterion(
         &correlations,
         factor.inputs,

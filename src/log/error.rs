@@ -355,6 +355,15 @@ impl LogError {
     }
 }
 
+/// What a message says of a header: all of it, unless it is far longer than a name is.
+pub(super) fn brief(header: &str) -> String {
+    const SHOWN: usize = 100;
+    match header.char_indices().nth(SHOWN) {
+        Some((end, _)) => format!("{}...", &header[..end]),
+        None => header.to_owned(),
+    }
+}
+
 /// What a message quotes of a cell: at most forty characters, control characters escaped.
 pub(super) fn shorten(text: &[u8]) -> String {
     const SHOWN: usize = 40;

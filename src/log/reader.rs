@@ -193,10 +193,6 @@ impl LogReader {
         }
         // The time stamps are the last slot for the length of this call.
         block.columns.push(std::mem::take(&mut self.times));
-        block
-            .columns
-            .iter_mut()
-            .for_each(|column| column.resize(BLOCK_ROWS, 0.0));
         let (rows, parsed) = self.parse_rows(&mut block.columns);
         block
             .columns
@@ -226,9 +222,12 @@ impl LogReader {
                 Ok(chunk) => chunk,
                 Err(error) => return (rows, Err(error)),
             };
-            let (done, result) = self
-                .parser
-                .parse(text, line, cut_off, columns, rows..BLOCK_ROWS);
+            // Room for what the text can hold, so that a file of many columns and few rows takes little memory.
+            let room = BLOCK_ROWS.min(rows + text.len() / self.parser.shortest_row() + 1);
+            for column in columns.iter_mut().filter(|column| column.len() < room) {
+                column.resize(room, 0.0);
+            }
+            let (done, result) = self.parser.parse(text, line, cut_off, columns, rows..room);
             rows += done.rows;
             self.lines.consume(done.bytes, done.lines);
             if result.is_err() {

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use super::error::DocumentError;
+use super::error::{DocumentError, repeated};
 use super::location::position_of;
 use super::read::{broken, no_document};
 use crate::explain::{EXPLANATION_FORMAT, Explanation};
@@ -47,7 +47,7 @@ pub fn parse_explanation(name: &str, text: &str) -> Result<Explanation, Document
     if explanation.format != EXPLANATION_FORMAT {
         return Err(DocumentError::Format {
             name: name.to_owned(),
-            found: explanation.format,
+            found: repeated(&explanation.format),
             expected: EXPLANATION_FORMAT,
             advice: "it was written by another version of innovant: update this one, or explain the recording again",
         });
@@ -61,7 +61,7 @@ pub fn parse_explanation(name: &str, text: &str) -> Result<Explanation, Document
                 .map(|at| format!(", line {}, column {}", at.line, at.column))
                 .unwrap_or_default(),
             key: "model".to_owned(),
-            message: error.to_string(),
+            message: repeated(&error.to_string()),
         })?;
     Ok(explanation)
 }
