@@ -5,7 +5,8 @@ use std::io::Write as _;
 
 use innovant::covariance::{frequency_response_covariance, pole_uncertainties};
 use innovant::identify::{
-    CovarianceKind, FileRecords, Method, Order, Recording, Records, identify_records,
+    CovarianceKind, FileRecords, Method, Order, Recording, Records, ReducedRecords, SAMPLES_KEPT,
+    identify_records,
 };
 use innovant::log::{Channel, Log, LogError, Roles, Source};
 use innovant::report::ModelDocument;
@@ -202,6 +203,49 @@ fn pieces_do_not_matter() {
             let mut pieces = Pieces { log: &log, piece };
             let model = identify_records(&mut pieces, &options).unwrap();
             assert_eq!(document(&model), whole, "pieces of {piece}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+
+    /// Moments of chunks, cut anywhere and joined, give the model of all samples: sums in another order round otherwise, and
+    /// where the polish ends does not depend on that.
+    #[test]
+    fn chunks_that_were_reduced_apart_do_not_matter(
+        seed in 1_u64..1000, cuts in prop::collection::btree_set(1_usize..3999, 1..4), wide in any::<bool>(),
+    ) {
+        let log = if wide { van_wingerden_one() } else { two_by_two() }.record(4000, seed);
+        let options = Options::default();
+        let mut rest = log.clone();
+        let mut taken = 0;
+        let mut joined: Option<ReducedRecords> = None;
+        for cut in cuts.into_iter().map(Some).chain([None]) {
+            let (part, left) = match cut {
+                Some(at) => rest.split_at(at - taken).map(|(part, left)| (part, Some(left))).unwrap(),
+                None => (rest.clone(), None),
+            };
+            let keep = if taken == 0 { SAMPLES_KEPT } else { 0 };
+            taken += part.samples();
+            let part = ReducedRecords::new(&part, 0, &options, keep).unwrap();
+            joined = Some(match joined {
+                Some(before) => before.append(&part).unwrap(),
+                None => part,
+            });
+            rest = left.unwrap_or(rest);
+        }
+        let model = identify_records(&mut joined.unwrap(), &options).unwrap();
+        let whole = identify(&[log], &options).unwrap();
+        prop_assert_eq!(model.system.states(), whole.system.states());
+        for (ours, theirs) in [
+            (&model.system.a, &whole.system.a),
+            (&model.system.b, &whole.system.b),
+            (&model.system.c, &whole.system.c),
+            (&model.system.k, &whole.system.k),
+        ] {
+            let apart = (ours - theirs).amax();
+            prop_assert!(apart < 1e-10, "{:e}", apart);
         }
     }
 }

@@ -211,6 +211,11 @@ fn check_windows(options: &Options, q: usize, outputs: usize) -> Result<(), Iden
     let orders: Vec<usize> = match &options.order {
         Order::Auto => Vec::new(),
         Order::Fixed(n) => vec![*n],
+        Order::Compare(list) if list.is_empty() => {
+            return Err(IdentifyError::Option(
+                "no order is given to compare; name at least one with --order".to_owned(),
+            ));
+        }
         Order::Compare(list) => list.clone(),
     };
     for order in orders {

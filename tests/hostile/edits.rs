@@ -43,7 +43,7 @@ fn value(bytes: &mut Bytes) -> Value {
         2 => json!([]),
         3 => json!({}),
         4 => json!(""),
-        5 => json!("x".repeat(bytes.count().min(100_000))),
+        5 => json!("x".repeat(bytes.count().min(5000))),
         6 => json!(bytes.count()),
         7 => json!(-(bytes.byte() as i64)),
         8 => {
