@@ -232,12 +232,15 @@ fn logs_that_were_changed_by_hand_are_checked() {
     }
 }
 
-/// Squares of 1e200 are infinite, and those of 1e-200 zero: fits were no numbers, and the document was not read back.
+/// Squares of 1e200 are infinite, and those of 1e-160 next to none: fits and covariances were no numbers, and documents were
+/// not read back.
 #[test]
-fn sizes_that_have_no_squares_are_not_explained() {
-    for size in [1e200, 1e-200] {
+fn sizes_that_have_no_squares_are_refused() {
+    for size in [1e200, 1e-160] {
         let mut log = servo().record(300, 1);
         log.output_data[0].iter_mut().for_each(|y| *y *= size);
+        let error = identify(std::slice::from_ref(&log), &Options::default()).unwrap_err();
+        assert!(matches!(error, IdentifyError::Size { .. }), "{error}");
         let simulation = Simulation::Outputs(vec![log.clone()]);
         let error = explain(&[log], &simulation, &Default::default()).unwrap_err();
         assert!(matches!(error, ExplainError::Size { .. }), "{error}");
@@ -268,5 +271,26 @@ fn explanations_hold_models_that_fit_together() {
             .unwrap_err()
             .to_string();
         assert!(message.contains("e.json, line 1"), "{pointer}: {message}");
+    }
+}
+
+/// A covariance with no degrees of freedom, or with a variance below zero, was accepted, and its quantile was a panic.
+#[test]
+fn covariances_are_some() {
+    let whole: Value = serde_json::from_str(include_str!("hostile/model.json")).unwrap();
+    hostile::parse_model(&whole.to_string());
+    for (key, wrong) in [
+        ("degrees_of_freedom", json!(0.0)),
+        ("degrees_of_freedom", json!(-3.0)),
+        ("degrees_of_freedom", json!(1e300)),
+        ("scale", json!(-1.0)),
+        ("scale", json!(1e308)),
+    ] {
+        let mut damaged = whole.clone();
+        damaged["covariance"][key] = wrong;
+        let text = damaged.to_string();
+        if parse_model("model.json", &text).is_ok() {
+            panic!("{key} of {} was accepted", damaged["covariance"][key]);
+        }
     }
 }

@@ -8,7 +8,7 @@ use super::plant::Plant;
 pub(crate) const MOST_STATES: usize = 12;
 /// A simulation that gets here has diverged. Far beyond what any unit makes of a sensible number, so that the limit
 /// knows no units; squares and products of such numbers still are numbers.
-pub(crate) const DIVERGED: f64 = 1e60;
+const DIVERGED: f64 = 1e60;
 
 /// How finely the recursion runs.
 #[derive(Debug, Clone, Copy)]

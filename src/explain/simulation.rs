@@ -11,12 +11,12 @@ use super::fit::{Effort, Fit, Problem};
 use super::offset::operating_point;
 use super::plant::Plant;
 use super::rebaseline::{MOST_DELAY, rebaseline, shifted};
-use super::run::{DIVERGED, MOST_STATES};
+use super::run::MOST_STATES;
 use super::search::{Boring, single_effects};
 use super::structure::Structure;
 use crate::identify::Model;
 use crate::linalg::spectral_radius;
-use crate::log::{Channel, Log};
+use crate::log::{Channel, LARGEST_SIZE, Log};
 
 /// What stands for the simulation.
 #[derive(Debug, Clone)]
@@ -119,7 +119,7 @@ fn check_sizes(log: &Log) -> Result<(), ExplainError> {
         let size = column
             .iter()
             .fold(0.0_f64, |most, v| most.max((v - first).abs()));
-        if largest >= DIVERGED || (size > 0.0 && size < 1.0 / DIVERGED) {
+        if largest >= LARGEST_SIZE || (size > 0.0 && size < 1.0 / LARGEST_SIZE) {
             return Err(ExplainError::Size {
                 recording: log.name.clone(),
                 channel: channel.name.clone(),

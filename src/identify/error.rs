@@ -71,6 +71,21 @@ pub enum IdentifyError {
         /// Where, when there are several experiments.
         place: String,
     },
+    /// Numbers whose squares and products are none.
+    #[error(
+        "{role} '{name}' has a mean of {level:e} and deviates from it by {deviation:e}; only sizes from 1e-60 to 1e60 are \
+         identified: give it in another unit"
+    )]
+    Size {
+        /// `input` or `output`.
+        role: &'static str,
+        /// Name of the channel.
+        name: String,
+        /// Mean, of the recording in which it is largest.
+        level: f64,
+        /// Standard deviation, the largest.
+        deviation: f64,
+    },
     /// Two channels that are the same signal up to scale and offset.
     #[error(
         "'{first}' and '{second}' are the same signal up to scale and offset (correlation {correlation:.12}); \

@@ -51,11 +51,12 @@ pub(super) const TRIES: [(f64, f64); 9] = [
     (1.0, 1e-1),
     (1.0, 1.0),
 ];
-/// A plain step that promises more than this share of the one before gets no nearer.
-const STALLED: f64 = 0.9;
 /// Steps in a row that each gain less than [`GAIN`] end the iteration: a flat valley, where the cost, and
-/// with it every prediction, no longer changes.
+/// with it every prediction, no longer changes. Steps that come to the minimum gain little too, but each promises less than
+/// [`NEARING`] of the one before.
 const FLAT_STEPS: usize = 3;
+/// See [`FLAT_STEPS`].
+const NEARING: f64 = 0.5;
 /// See [`FLAT_STEPS`]; in units of chi-square.
 const GAIN: f64 = 1e-5;
 
@@ -123,6 +124,7 @@ pub fn polish(
     let hopeless = HOPELESS * degrees_of_freedom as f64;
     let mut converged = false;
     let mut promised = f64::INFINITY;
+    let exact = effort == Effort::Full && largest_radius.is_none();
     let covariance = loop {
         let jacobian = problem.jacobian(&system);
         if !all_finite(&jacobian) {
@@ -137,14 +139,15 @@ pub fn polish(
         };
         let linearised = linearise(jacobian, residual.as_slice(), rank, &boundary)?;
         let before = std::mem::replace(&mut promised, linearised.decrease());
-        let plain = promised < PLAIN && effort == Effort::Full && largest_radius.is_none();
+        let plain = promised < PLAIN && exact;
         let enough = if plain { DECREASE } else { REFEREE_DECREASE };
         // Plain steps that no longer shrink have met the rounding of the residual.
-        if promised < enough || flat == FLAT_STEPS || (plain && promised > STALLED * before) {
+        if promised < enough || flat == FLAT_STEPS || (plain && promised >= before) {
             converged = true;
             break linearised.covariance();
         }
         if iterations == ITERATIONS || (effort == Effort::Referee && slow == FLAT_STEPS) {
+            converged = plain;
             break linearised.covariance();
         }
         iterations += 1;
@@ -181,7 +184,8 @@ pub fn polish(
             .min_by(|a, b| a.1.total_cmp(&b.1));
         match better {
             Some((candidate, candidate_cost)) => {
-                flat = if cost - candidate_cost < GAIN {
+                let nearing = exact && promised < NEARING * before;
+                flat = if cost - candidate_cost < GAIN && !nearing {
                     flat + 1
                 } else {
                     0
