@@ -294,3 +294,9 @@ fn covariances_are_some() {
         }
     }
 }
+
+/// Damaged gzip data were said to be UTF-16 when they came in small pieces.
+#[test]
+fn damage_is_named_before_what_it_looks_like() {
+    hostile::csv_reader(&[0x07, 0x00, 0xFF, 0x2C, 0x08, 0x00, 0x00, 0x00]);
+}

@@ -102,7 +102,9 @@ impl LogReader {
     }
 
     fn start(mut lines: Lines, roles: &Roles, need: RoleNeed) -> Result<Self, LogError> {
-        let header = Header::read(&mut lines)?;
+        // As in next_block: what is no text may be what damage left of it.
+        let header = Header::read(&mut lines).map_err(|error| lines.damage().unwrap_or(error));
+        let header = header?;
         let assigned = assign(roles, need, &header)?;
         let mut slots = vec![None; header.channels.len()];
         let channels = assigned.inputs.iter().chain(&assigned.outputs);

@@ -132,6 +132,8 @@ pub fn csv_reader(bytes: &[u8]) {
     let pieces = read(Dribble(Cursor::new(file), piece), &roles, need);
     match (&whole, &pieces) {
         (Ok(a), Ok(b)) => assert_eq!(a, b),
+        // Damage may be met before or after what it made of the columns.
+        (Err(_), Err(_)) if kind & 4 == 4 && (kind & 8 == 8 || damage > 127) => {}
         (Err(a), Err(b)) => assert_eq!(a, b),
         _ => panic!("other pieces, another answer: {whole:?} and {pieces:?}"),
     }

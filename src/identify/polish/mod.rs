@@ -122,7 +122,7 @@ pub fn polish(
     let mut slow = 0;
     let degrees_of_freedom = (layout.outputs * varx.regressors()).saturating_sub(rank);
     let hopeless = HOPELESS * degrees_of_freedom as f64;
-    let mut converged = false;
+    let converged;
     let mut promised = f64::INFINITY;
     let exact = effort == Effort::Full && largest_radius.is_none();
     let covariance = loop {
