@@ -237,6 +237,13 @@ impl AugmentedModel {
         if !is_sample_time(self.sample_time) {
             return Err(damaged("the sample time is no positive number of seconds"));
         }
+        if let Some(mechanics) = &self.mechanics
+            && mechanics.window.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater)
+        {
+            return Err(damaged(
+                "the window of the equation of motion has no length",
+            ));
+        }
         if self.input_delays.len() != self.inputs.len() {
             return Err(damaged("there is not one delay for each input"));
         }

@@ -41,7 +41,7 @@ impl AugmentedModel {
     ) -> Result<Vec<f64>, AugmentedError> {
         // A drive integrates: over a longer stretch the start would make up for whatever the model misses.
         let most = self.mechanics.as_ref().map_or(INITIAL_SAMPLES, |m| {
-            (m.window / self.sample_time).ceil() as usize + 1
+            ((m.window / self.sample_time).ceil() as usize).saturating_add(1)
         });
         let length = inputs.first().map_or(0, |u| u.len());
         let l = self.outputs.len();

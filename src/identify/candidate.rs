@@ -58,6 +58,29 @@ impl Window {
         } else {
             None
         };
+        Ok(self.made(order, estimate, polished))
+    }
+
+    /// A candidate with which a referee was content, polished to the minimum: where a referee stops depends on rounding.
+    pub fn finished(&self, candidate: Candidate) -> Candidate {
+        let Some(content) = &candidate.polished else {
+            return candidate;
+        };
+        match polish(&content.system, &self.windows.varx, None, Effort::Full) {
+            Ok(end) => {
+                let polished = Polished {
+                    start_cost: content.start_cost,
+                    iterations: content.iterations + end.iterations,
+                    ..end
+                };
+                self.made(candidate.order, candidate.estimate, Some(polished))
+            }
+            Err(_) => candidate,
+        }
+    }
+
+    fn made(&self, order: usize, estimate: Estimated, polished: Option<Polished>) -> Candidate {
+        let varx = &self.windows.varx;
         let innovation_covariance = &varx.innovation_covariance;
         let best = polished.as_ref().map_or(&estimate.system, |p| &p.system);
         let predictor =
@@ -71,14 +94,14 @@ impl Window {
             varx.columns,
         )
         .unwrap_or(f64::INFINITY);
-        Ok(Candidate {
+        Candidate {
             order,
             estimate,
             polished,
             predictor,
             state_covariance,
             truncation,
-        })
+        }
     }
 }
 

@@ -146,7 +146,7 @@ fn select_by(
         }
         Order::Auto => choose_order(&mut evidence, varx, &mut estimator),
     };
-    estimator.for_good(polish, proposal_only);
+    estimator.for_good(order, polish, proposal_only);
     let candidate = estimator.candidate(order)?.clone();
     if polish {
         note(&mut evidence, &candidate, varx);
@@ -174,13 +174,15 @@ struct Estimator<'a, 'b> {
 }
 
 impl Estimator<'_, '_> {
-    /// From here on candidates are final: what the referee was content with is estimated again. A proposal is not
-    /// final, and a method that makes its own improvements waits with them.
-    fn for_good(&mut self, polish: bool, proposal_only: bool) {
+    /// From here on candidates are final: with what the referee was content is taken to its end, or estimated again. A
+    /// proposal is not final, and a method that makes its own improvements waits with them.
+    fn for_good(&mut self, order: usize, polish: bool, proposal_only: bool) {
         let own_numbers = self.options.method.polishes_itself();
         let converged = |c: &Candidate| c.polished.as_ref().is_some_and(|p| p.converged);
         self.candidates
-            .retain(|c| polish && !own_numbers && converged(c));
+            .retain(|c| c.order == order && polish && !own_numbers && converged(c));
+        let kept = std::mem::take(&mut self.candidates);
+        self.candidates = kept.into_iter().map(|c| self.window.finished(c)).collect();
         self.window.polish = polish && !own_numbers;
         self.window.effort = Effort::Full;
         if own_numbers && !proposal_only {
