@@ -42,7 +42,7 @@ impl<'a> ArrayRecords<'a> {
         inputs: &[String],
         outputs: &[String],
     ) -> Result<Self, LogError> {
-        if !(sample_time.is_finite() && sample_time > 0.0) {
+        if !innovant::log::is_sample_time(sample_time) {
             return Err(LogError::InvalidSampleTime { sample_time });
         }
         let count = u.len();

@@ -1,6 +1,7 @@
 //! Values of flags: orders, windows, times.
 
 use crate::identify::Order;
+use crate::log::is_sample_time;
 
 /// Largest order that may be asked for: beyond it no recording says anything.
 const LARGEST_ORDER: usize = 1000;
@@ -61,7 +62,7 @@ pub(super) fn window(text: &str) -> Result<Window, String> {
 pub(super) fn seconds(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()
-        .filter(|value: &f64| value.is_finite() && *value > 0.0)
+        .filter(|value: &f64| is_sample_time(*value))
         .ok_or_else(|| "expected a positive number of seconds, such as 0.01".to_owned())
 }
 

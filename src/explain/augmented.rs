@@ -12,7 +12,7 @@ use super::functionals::Functionals;
 use super::plant::{Plant, row_major};
 use super::simulation::delayed;
 use super::structure::{Direction, Instance, Signal, Structure};
-use crate::log::Channel;
+use crate::log::{Channel, is_sample_time};
 use crate::report::Rows;
 
 /// Why an augmented model cannot be run.
@@ -29,6 +29,11 @@ pub enum AugmentedError {
     /// Inputs that do not fit.
     #[error("the model needs {needed} inputs of equal length, and {found} are given")]
     Inputs { needed: usize, found: usize },
+    /// Recorded outputs that do not fit.
+    #[error(
+        "the model has {needed} outputs, and as many recorded ones of the length of the inputs are needed; {found} are given"
+    )]
+    Outputs { needed: usize, found: usize },
     /// The outputs run away.
     #[error(
         "the simulation diverges on this input: it leaves the range that the model was fitted in; give an input of the amplitude of the recording"
@@ -177,12 +182,31 @@ impl AugmentedModel {
             .ok_or(AugmentedError::Diverges)
     }
 
+    /// Whether the parts fit together, those of the reference too.
+    ///
+    /// # Errors
+    /// [`AugmentedError::Unknown`] or [`AugmentedError::Damaged`].
+    pub(crate) fn check(&self) -> Result<(), AugmentedError> {
+        self.structure()?;
+        let Some(reference) = &self.reference else {
+            return Ok(());
+        };
+        if reference.inputs.len() != self.inputs.len()
+            || reference.outputs.len() != self.outputs.len()
+        {
+            return Err(AugmentedError::Damaged {
+                what: "the reference has other inputs or outputs than the model".to_owned(),
+            });
+        }
+        reference.check()
+    }
+
     /// The structure with all numbers fixed.
     pub(crate) fn structure(&self) -> Result<Structure, AugmentedError> {
         let damaged = |what: &str| AugmentedError::Damaged {
             what: what.to_owned(),
         };
-        let (n, l) = (self.a.0.nrows(), self.c.0.nrows());
+        let (n, l) = (self.a.0.nrows(), self.outputs.len());
         let r = self.inputs.len() + usize::from(self.constant_input);
         let shaped = |m: &Rows,
                       rows: usize,
@@ -210,13 +234,24 @@ impl AugmentedModel {
                 super::finer::MOST_STEPS
             )));
         }
-        if !(self.sample_time.is_finite() && self.sample_time > 0.0) {
-            return Err(damaged("the sample time is not positive"));
+        if !is_sample_time(self.sample_time) {
+            return Err(damaged("the sample time is no positive number of seconds"));
         }
-        if let Some(prior) = &self.initial_state_prior
-            && (prior.mean.len() != n || prior.mean.iter().any(|v| !v.is_finite()))
+        if let Some(mechanics) = &self.mechanics
+            && mechanics.window.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater)
         {
-            return Err(damaged("the prior of the initial state does not fit A"));
+            return Err(damaged(
+                "the window of the equation of motion has no length",
+            ));
+        }
+        if self.input_delays.len() != self.inputs.len() {
+            return Err(damaged("there is not one delay for each input"));
+        }
+        if self.initial_states.iter().any(|x0| x0.len() != n) {
+            return Err(damaged("an initial state does not fit A"));
+        }
+        if let Some(prior) = &self.initial_state_prior {
+            prior.check(n)?;
         }
         let plant = Plant {
             states: n,

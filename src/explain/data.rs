@@ -74,7 +74,7 @@ impl Data {
 }
 
 /// Standard deviation about the mean; 1 when there is no variation to divide by.
-fn deviation<'a>(values: impl Iterator<Item = &'a f64> + Clone) -> f64 {
+pub(super) fn deviation<'a>(values: impl Iterator<Item = &'a f64> + Clone) -> f64 {
     let n = values.clone().count().max(1) as f64;
     let mean = values.clone().sum::<f64>() / n;
     let variance = values.map(|v| (v - mean).powi(2)).sum::<f64>() / n;

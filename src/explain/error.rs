@@ -1,6 +1,7 @@
 //! What can be wrong with a question to `explain`.
 
 use crate::limits::LimitError;
+use crate::log::LogError;
 
 /// Why there is no answer. Messages are worded for the command line.
 #[derive(Debug, thiserror::Error)]
@@ -10,6 +11,14 @@ pub enum ExplainError {
     /// It would take more memory than it may.
     #[error(transparent)]
     Limit(#[from] LimitError),
+    /// What was given is no recording, or not of the same plant.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// Nothing to answer to, or nothing that answers.
+    #[error(
+        "{recording}: explain needs at least one input and one output; name the columns with --inputs and --outputs"
+    )]
+    NoChannels { recording: String },
     /// No recording was given.
     #[error("explain needs at least one recording")]
     NoRecording,
@@ -61,6 +70,16 @@ pub enum ExplainError {
         channel: String,
         recorded: String,
         simulated: String,
+    },
+    /// Numbers whose squares and products are none.
+    #[error(
+        "{recording}: {channel} moves by {size:e} and reaches {largest:e}; only sizes from 1e-60 to 1e60 are explained: give it in another unit"
+    )]
+    Size {
+        recording: String,
+        channel: String,
+        size: f64,
+        largest: f64,
     },
     /// Too few samples.
     #[error(

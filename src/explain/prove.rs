@@ -57,6 +57,18 @@ pub(crate) fn refit(problem: &Problem, fit: &Fit, train: &Mask) -> Option<Fit> {
     fit.improved(&without, Effort::RANK)
 }
 
+/// An error so many times the output's variation is as bad as any; an output that stands still has none.
+const MOST_LOST: f64 = 1e6;
+
+/// Root of the ratio of an error to what is there, sums of squares.
+fn lost_share(error: f64, there: f64) -> f64 {
+    if error == 0.0 {
+        0.0
+    } else {
+        (error / there).sqrt().min(MOST_LOST)
+    }
+}
+
 /// Fit figure of one output over the samples of `mask`.
 pub(crate) fn figure(data: &Data, residual: &Series, mask: &Mask, output: usize) -> FitFigure {
     let (mut error, mut n, mut sum) = (0.0, 0.0, 0.0);
@@ -80,7 +92,7 @@ pub(crate) fn figure(data: &Data, residual: &Series, mask: &Mask, output: usize)
     each(&mut |y, _| there += (y - mean).powi(2));
     FitFigure {
         rmse: (error / f64::max(n, 1.0)).sqrt(),
-        fit_percent: 100.0 * (1.0 - (error / f64::max(there, 1e-300)).sqrt()),
+        fit_percent: 100.0 * (1.0 - lost_share(error, there)),
     }
 }
 
@@ -110,7 +122,11 @@ pub(crate) fn steps(
         augmented,
         noise_floor: FitFigure {
             rmse,
-            fit_percent: 100.0 - lost * rmse / augmented.rmse.max(1e-300),
+            fit_percent: if augmented.rmse > 0.0 {
+                100.0 - lost * rmse / augmented.rmse
+            } else {
+                100.0
+            },
         },
         improvement_95: seed.and_then(|seed| improvement(steps, mask, data.outputs, output, seed)),
     }

@@ -16,7 +16,7 @@ use super::search::{Boring, single_effects};
 use super::structure::Structure;
 use crate::identify::Model;
 use crate::linalg::spectral_radius;
-use crate::log::{Channel, Log};
+use crate::log::{Channel, LARGEST_SIZE, Log};
 
 /// What stands for the simulation.
 #[derive(Debug, Clone)]
@@ -50,6 +50,15 @@ const UNDERSTOOD: f64 = 0.5;
 pub(crate) fn know(recordings: &[Log], simulation: &Simulation) -> Result<Known, ExplainError> {
     let first = recordings.first().ok_or(ExplainError::NoRecording)?;
     for log in recordings {
+        log.check()?;
+        first.check_same_kind(log)?;
+    }
+    if first.inputs.is_empty() || first.outputs.is_empty() {
+        return Err(ExplainError::NoChannels {
+            recording: first.name.clone(),
+        });
+    }
+    for log in recordings {
         for (channel, y) in log.outputs.iter().zip(&log.output_data) {
             if y.iter().all(|v| *v == y[0]) {
                 return Err(ExplainError::Constant {
@@ -59,9 +68,12 @@ pub(crate) fn know(recordings: &[Log], simulation: &Simulation) -> Result<Known,
             }
         }
     }
+    recordings.iter().try_for_each(check_sizes)?;
     let known = match simulation {
         Simulation::Model(model, name) => of_model(recordings, model, name)?,
         Simulation::Outputs(logs) => {
+            logs.iter().try_for_each(Log::check)?;
+            logs.iter().try_for_each(check_sizes)?;
             check_outputs(recordings, logs)?;
             of_outputs(recordings, logs)?
         }
@@ -95,6 +107,28 @@ pub(crate) fn know(recordings: &[Log], simulation: &Simulation) -> Result<Known,
         });
     }
     Ok(known)
+}
+
+/// Refuses channels so large or so small that their squares and products leave the range of numbers. A channel that does
+/// not move at all is small in no unit.
+fn check_sizes(log: &Log) -> Result<(), ExplainError> {
+    let channels = log.inputs.iter().chain(&log.outputs);
+    for (channel, column) in channels.zip(log.channel_data()) {
+        let largest = column.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let first = column.first().copied().unwrap_or(0.0);
+        let size = column
+            .iter()
+            .fold(0.0_f64, |most, v| most.max((v - first).abs()));
+        if largest >= LARGEST_SIZE || (size > 0.0 && size < 1.0 / LARGEST_SIZE) {
+            return Err(ExplainError::Size {
+                recording: log.name.clone(),
+                channel: channel.name.clone(),
+                size,
+                largest,
+            });
+        }
+    }
+    Ok(())
 }
 
 /// "1 input", "2 inputs".

@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::augmented::AugmentedError;
-use super::explanation::AugmentedModel;
+use super::data::deviation;
+use super::explanation::{AugmentedModel, StatePrior};
 
 /// Samples that an initial state is estimated from, at most.
 const INITIAL_SAMPLES: usize = 2000;
@@ -40,12 +41,28 @@ impl AugmentedModel {
     ) -> Result<Vec<f64>, AugmentedError> {
         // A drive integrates: over a longer stretch the start would make up for whatever the model misses.
         let most = self.mechanics.as_ref().map_or(INITIAL_SAMPLES, |m| {
-            (m.window / self.sample_time).ceil() as usize + 1
+            ((m.window / self.sample_time).ceil() as usize).saturating_add(1)
         });
-        let samples = inputs.first().map_or(0, |u| u.len()).min(most);
-        let inputs: Vec<&[f64]> = inputs.iter().map(|u| &u[..samples]).collect();
+        let length = inputs.first().map_or(0, |u| u.len());
         let l = self.outputs.len();
-        let scale: Vec<f64> = outputs.iter().map(|y| deviation(&y[..samples])).collect();
+        if outputs.len() != l || outputs.iter().any(|y| y.len() != length) {
+            return Err(AugmentedError::Outputs {
+                needed: l,
+                found: outputs.len(),
+            });
+        }
+        if inputs.iter().any(|u| u.len() != length) {
+            return Err(AugmentedError::Inputs {
+                needed: self.inputs.len(),
+                found: inputs.len(),
+            });
+        }
+        let samples = length.min(most);
+        let inputs: Vec<&[f64]> = inputs.iter().map(|u| &u[..samples]).collect();
+        let scale: Vec<f64> = outputs
+            .iter()
+            .map(|y| deviation(y[..samples].iter()))
+            .collect();
         let prior = self.prior(&scale)?;
         let error = |x: &DVector<f64>| -> Result<DVector<f64>, AugmentedError> {
             let y = self.run(&inputs, Some(x.as_slice()))?;
@@ -93,14 +110,8 @@ impl AugmentedModel {
                 spread: vec![spread; n],
             });
         };
+        let inverse = prior.information(n)?;
         let covariance = prior.covariance.clone().shaped(n, n);
-        let inverse = (covariance.shape() == (n, n))
-            .then(|| covariance.clone().cholesky())
-            .flatten()
-            .map(|c| c.inverse())
-            .ok_or_else(|| AugmentedError::Damaged {
-                what: "the covariance of the initial state is not positive definite".to_owned(),
-            })?;
         Ok(Prior {
             mean: DVector::from_column_slice(&prior.mean),
             weight: inverse * (prior.error_std / largest).powi(2),
@@ -109,13 +120,35 @@ impl AugmentedModel {
     }
 }
 
-/// Standard deviation of an output, not zero.
-fn deviation(y: &[f64]) -> f64 {
-    let n = y.len().max(1) as f64;
-    let mean = y.iter().sum::<f64>() / n;
-    (y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n)
-        .sqrt()
-        .max(1e-12)
+impl StatePrior {
+    /// Whether it is one of `n` states.
+    pub(super) fn check(&self, n: usize) -> Result<(), AugmentedError> {
+        let number = |v: &f64| v.is_finite();
+        if self.mean.len() != n || !self.mean.iter().all(number) {
+            return Err(AugmentedError::Damaged {
+                what: "the prior of the initial state does not fit A".to_owned(),
+            });
+        }
+        if !(self.error_std.is_finite() && self.error_std >= 0.0) {
+            return Err(AugmentedError::Damaged {
+                what: "`error_std` of the initial state is negative".to_owned(),
+            });
+        }
+        self.information(n).map(|_| ())
+    }
+
+    /// Inverse of the covariance.
+    fn information(&self, n: usize) -> Result<DMatrix<f64>, AugmentedError> {
+        let covariance = self.covariance.clone().shaped(n, n);
+        (covariance.shape() == (n, n))
+            .then(|| covariance.cholesky())
+            .flatten()
+            .map(|c| c.inverse())
+            .filter(|inverse| inverse.iter().all(|v| v.is_finite()))
+            .ok_or_else(|| AugmentedError::Damaged {
+                what: "the covariance of the initial state is not positive definite".to_owned(),
+            })
+    }
 }
 
 /// Scaled errors of the outputs from an initial state.

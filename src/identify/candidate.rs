@@ -57,24 +57,15 @@ impl Window {
         } else {
             None
         };
-        Ok(self.judged(estimate, polished))
+        Ok(self.made(order, estimate, polished))
     }
 
     /// `candidate` polished from another start, that of a larger model without the states that matter least, where that
     /// ends lower.
     pub fn reconsidered(&self, candidate: &Candidate, larger: &StateSpace) -> Option<Candidate> {
-        let start = reduced(larger, &self.windows.varx, candidate.order)?;
-        self.polished_from(&start, candidate)
-    }
-
-    /// `candidate` polished further, from where its polish ended.
-    pub fn continued(&self, candidate: &Candidate) -> Option<Candidate> {
-        self.polished_from(&candidate.polished.as_ref()?.system, candidate)
-    }
-
-    /// `candidate` polished from `start`, where that ends lower.
-    fn polished_from(&self, start: &StateSpace, candidate: &Candidate) -> Option<Candidate> {
-        let mut found = polish(start, &self.windows.varx, None, self.effort).ok()?;
+        let varx = &self.windows.varx;
+        let start = reduced(larger, varx, candidate.order)?;
+        let mut found = polish(&start, varx, None, self.effort).ok()?;
         if let Some(before) = &candidate.polished {
             if found.cost > before.cost {
                 return None;
@@ -82,10 +73,28 @@ impl Window {
             // What the polish gains, it gains over the estimate of the method.
             found.start_cost = before.start_cost;
         }
-        Some(self.judged(candidate.estimate.clone(), Some(found)))
+        Some(self.made(candidate.order, candidate.estimate.clone(), Some(found)))
     }
 
-    fn judged(&self, estimate: Estimated, polished: Option<Polished>) -> Candidate {
+    /// A candidate with which a referee was content, polished to the minimum: where a referee stops depends on rounding.
+    pub fn finished(&self, candidate: Candidate) -> Candidate {
+        let Some(content) = &candidate.polished else {
+            return candidate;
+        };
+        match polish(&content.system, &self.windows.varx, None, Effort::Full) {
+            Ok(end) => {
+                let polished = Polished {
+                    start_cost: content.start_cost,
+                    iterations: content.iterations + end.iterations,
+                    ..end
+                };
+                self.made(candidate.order, candidate.estimate, Some(polished))
+            }
+            Err(_) => candidate,
+        }
+    }
+
+    fn made(&self, order: usize, estimate: Estimated, polished: Option<Polished>) -> Candidate {
         let varx = &self.windows.varx;
         let innovation_covariance = &varx.innovation_covariance;
         let best = polished.as_ref().map_or(&estimate.system, |p| &p.system);
@@ -101,7 +110,7 @@ impl Window {
         )
         .unwrap_or(f64::INFINITY);
         Candidate {
-            order: estimate.system.states(),
+            order,
             estimate,
             polished,
             predictor,

@@ -5,7 +5,7 @@ use super::error::IdentifyError;
 use super::options::Options;
 use super::records::Records;
 use super::reduced::ReducedRecords;
-use crate::log::Channel;
+use crate::log::{Channel, LARGEST_SIZE};
 use crate::moments::{
     BlockAccumulator, Gram, LagAccumulator, LagMoments, PanelQr, RFactor, Trend, block_grams,
 };
@@ -190,6 +190,25 @@ impl Data {
                     } else {
                         String::new()
                     },
+                });
+            }
+            let largest = |of: &dyn Fn(&LagMoments) -> f64| {
+                // NaN is what infinite sums leave: as large as can be.
+                self.experiments
+                    .iter()
+                    .map(of)
+                    .map(|v| if v.is_nan() { f64::INFINITY } else { v.abs() })
+                    .fold(0.0, f64::max)
+            };
+            let level = largest(&|moments| moments.mean()[c]);
+            let deviation = largest(&|moments| moments.standard_deviation()[c]);
+            if level.max(deviation) >= LARGEST_SIZE || deviation < 1.0 / LARGEST_SIZE {
+                let (role, name) = channel(c);
+                return Err(IdentifyError::Size {
+                    role,
+                    name,
+                    level,
+                    deviation,
                 });
             }
         }

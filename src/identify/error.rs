@@ -57,6 +57,12 @@ pub enum IdentifyError {
         /// Samples needed.
         needed: usize,
     },
+    /// Nothing to model.
+    #[error("the recording has no {role}; name at least one column with --{role}s")]
+    NoChannel {
+        /// `input` or `output`.
+        role: &'static str,
+    },
     /// A channel that never changes.
     #[error(
         "{role} '{name}' is constant{place}: it carries no information; leave it out with --inputs and --outputs"
@@ -68,6 +74,21 @@ pub enum IdentifyError {
         name: String,
         /// Where, when there are several experiments.
         place: String,
+    },
+    /// Numbers whose squares and products are none.
+    #[error(
+        "{role} '{name}' has a mean of {level:e} and deviates from it by {deviation:e}; only sizes from 1e-60 to 1e60 are \
+         identified: give it in another unit"
+    )]
+    Size {
+        /// `input` or `output`.
+        role: &'static str,
+        /// Name of the channel.
+        name: String,
+        /// Mean, of the recording in which it is largest.
+        level: f64,
+        /// Standard deviation, the largest.
+        deviation: f64,
     },
     /// Two channels that are the same signal up to scale and offset.
     #[error(

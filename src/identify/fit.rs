@@ -169,6 +169,11 @@ pub(super) fn lags_needed(
     inputs: usize,
     outputs: usize,
 ) -> Result<usize, IdentifyError> {
+    for (role, count) in [("input", inputs), ("output", outputs)] {
+        if count == 0 {
+            return Err(IdentifyError::NoChannel { role });
+        }
+    }
     let q = inputs + outputs;
     check_windows(options, outputs)?;
     let longest = longest_past(options, q);
@@ -219,6 +224,11 @@ fn check_windows(options: &Options, outputs: usize) -> Result<(), IdentifyError>
     let orders: Vec<usize> = match &options.order {
         Order::Auto => Vec::new(),
         Order::Fixed(n) => vec![*n],
+        Order::Compare(list) if list.is_empty() => {
+            return Err(IdentifyError::Option(
+                "no order is given to compare; name at least one with --order".to_owned(),
+            ));
+        }
         Order::Compare(list) => list.clone(),
     };
     for order in orders {
@@ -292,7 +302,7 @@ fn choose_past(
     let preferred = options
         .method
         .smallest_past(outputs, options.order.largest());
-    if smallest > limit || smallest * (q + 1) + outputs >= data.samples {
+    if smallest > limit || smallest.saturating_mul(q + 1) + outputs >= data.samples {
         let order = options.order.largest();
         // The past window that the recording allows, with more windows than regressors.
         let largest = (data.samples.saturating_sub(outputs + 1) / (q + 1)).min(longest);

@@ -135,7 +135,8 @@ fn proposal(windowed: &Windowed, options: &Options) -> Result<usize, IdentifyErr
     let largest = order::LARGEST_AUTOMATIC_ORDER;
     let future = options
         .future
-        .unwrap_or_else(|| horizon::future_for_order_choice(factor.past, factor.outputs, largest));
+        .unwrap_or_else(|| horizon::future_for_order_choice(factor.past, factor.outputs, largest))
+        .min(factor.past);
     let canonical = decompose(factor, varx, future, Weight::Cva)?;
     let correlations =
         order::canonical_correlations(&canonical.svd.singular_values, factor.columns);

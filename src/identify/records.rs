@@ -69,11 +69,13 @@ impl<'a> MemoryRecords<'a> {
     /// Several experiments of one plant.
     ///
     /// # Errors
-    /// [`LogError`] when there is no experiment, or they differ in channels or sampling.
+    /// [`LogError`] when there is no experiment, one is no recording ([`Log::check`]), or they differ in channels or
+    /// sampling.
     pub fn new(logs: &'a [Log]) -> Result<Self, LogError> {
         let Some(first) = logs.first() else {
             return Err(LogError::too_short("the recording", 0, 1, "identification"));
         };
+        logs.iter().try_for_each(Log::check)?;
         for other in &logs[1..] {
             first.check_same_kind(other)?;
         }

@@ -34,8 +34,7 @@ pub const SAMPLES_KEPT: usize = 20_000;
 ///     .append(&ReducedRecords::new(&second, 0, &options, 0)?)?;
 /// let model = identify_records(&mut reduced, &options)?;
 /// let whole = identify(&[log], &options)?;
-/// // The polish ends at the rounding of its cost, which is 1e-6 standard deviations.
-/// assert!((model.system.a - whole.system.a).amax() < 1e-8);
+/// assert!((model.system.a - whole.system.a).amax() < 1e-10);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -96,13 +96,12 @@ fn select_by(
     let future_for_choice = options
         .future
         .unwrap_or_else(|| horizon::future_for_order_choice(past, outputs, largest));
-    let canonical = decompose(factor, varx, future_for_choice, Weight::Cva)?;
+    // A method may look further ahead than back; the singular values that orders are compared by do not.
+    let ahead = future_for_choice.min(past);
+    let canonical = decompose(factor, varx, ahead, Weight::Cva)?;
     let correlations =
         order::canonical_correlations(&canonical.svd.singular_values, factor.columns);
-    let possible = canonical
-        .svd
-        .largest_order()
-        .min(future_for_choice * outputs);
+    let possible = canonical.svd.largest_order().min(ahead * outputs);
     let mut evidence = order::singular_value_criterion(
         &correlations,
         factor.inputs,
@@ -149,8 +148,8 @@ fn select_by(
         }
         Order::Auto => choose_order(&mut evidence, varx, &mut estimator)?,
     };
-    estimator.for_good(polish, proposal_only);
-    let candidate = estimator.finished(order)?;
+    estimator.for_good(order, polish, proposal_only);
+    let candidate = estimator.candidate(order)?.clone();
     if polish {
         note(&mut evidence, &candidate, varx);
     }
@@ -177,12 +176,14 @@ struct Estimator<'a, 'b> {
 }
 
 impl Estimator<'_, '_> {
-    /// From here on candidates are final. A proposal is not final, and a method that makes its own improvements waits
-    /// with them.
-    fn for_good(&mut self, polish: bool, proposal_only: bool) {
+    /// From here on candidates are final: with what the referee was content is taken to its end, or estimated again. A
+    /// proposal is not final, and a method that makes its own improvements waits with them.
+    fn for_good(&mut self, order: usize, polish: bool, proposal_only: bool) {
         let own_numbers = self.options.method.polishes_itself();
         self.candidates
-            .retain(|c| polish && !own_numbers && c.polished.is_some());
+            .retain(|c| c.order == order && polish && !own_numbers && c.polished.is_some());
+        let kept = std::mem::take(&mut self.candidates);
+        self.candidates = kept.into_iter().map(|c| self.window.finished(c)).collect();
         self.window.polish = polish && !own_numbers;
         self.window.effort = Effort::Full;
         if own_numbers && !proposal_only {
@@ -191,17 +192,6 @@ impl Estimator<'_, '_> {
             self.window.windows.polish_by_method = polish;
             self.decompositions.clear();
         }
-    }
-
-    /// The candidate of the chosen order, polished to the end.
-    fn finished(&mut self, order: usize) -> Result<Candidate, IdentifyError> {
-        let candidate = self.candidate(order)?.clone();
-        let done = candidate.polished.as_ref().is_none_or(|p| p.converged);
-        Ok(if done {
-            candidate
-        } else {
-            self.window.continued(&candidate).unwrap_or(candidate)
-        })
     }
 
     /// Estimates an order once more, from the accepted model of the order above it. What a subspace method makes of

@@ -56,7 +56,20 @@ pub fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex64>, LinalgError>
     let values = view(matrix)
         .eigenvalues()
         .map_err(|_| no_convergence(matrix))?;
-    Ok(values.iter().map(|v| Complex64::new(v.re, v.im)).collect())
+    numbers(matrix, values.iter().map(|v| Complex64::new(v.re, v.im)))
+}
+
+/// Eigenvalues, unless entries far apart in size took them out of the range of numbers.
+fn numbers(
+    matrix: &DMatrix<f64>,
+    values: impl Iterator<Item = Complex64>,
+) -> Result<Vec<Complex64>, LinalgError> {
+    let values: Vec<Complex64> = values.collect();
+    if values.iter().all(|v| v.is_finite()) {
+        Ok(values)
+    } else {
+        Err(no_convergence(matrix))
+    }
 }
 
 /// Largest modulus of the eigenvalues (0 for an empty matrix).
@@ -95,9 +108,10 @@ pub fn eigen(matrix: &DMatrix<f64>) -> Result<Eigen, LinalgError> {
         what: "eigenvectors of a defective matrix",
     })?;
     Ok(Eigen {
-        values: (0..n)
-            .map(|i| Complex64::new(values[i].re, values[i].im))
-            .collect(),
+        values: numbers(
+            matrix,
+            (0..n).map(|i| Complex64::new(values[i].re, values[i].im)),
+        )?,
         right,
         left,
     })

@@ -282,7 +282,8 @@ pub enum LogError {
     },
     /// The sample time asked for is zero, negative or not finite.
     #[error(
-        "the sample time must be a positive number of seconds, found {sample_time}; for example `--dt 0.01`"
+        "the sample time must be a positive number of seconds, between 1e-18 and 1e18, found {sample_time}; for example \
+         `--dt 0.01`"
     )]
     InvalidSampleTime { sample_time: f64 },
     /// Experiments that belong together have other channels.
@@ -399,6 +400,15 @@ impl LogError {
             purpose: purpose.to_owned(),
             hint: "",
         }
+    }
+}
+
+/// What a message says of a header: all of it, unless it is far longer than a name is.
+pub(super) fn brief(header: &str) -> String {
+    const SHOWN: usize = 100;
+    match header.char_indices().nth(SHOWN) {
+        Some((end, _)) => format!("{}...", &header[..end]),
+        None => header.to_owned(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The first line of a recording: its separator, its names, or that it has none.
 
 use super::channel::Channel;
-use super::error::LogError;
+use super::error::{LogError, brief};
 use super::lines::Lines;
 use super::parse;
 
@@ -98,7 +98,7 @@ impl Header {
             .channels
             .iter()
             .take(SHOWN)
-            .map(|c| format!("`{c}`"))
+            .map(|c| format!("`{}`", brief(&c.to_string())))
             .collect();
         if self.channels.len() > SHOWN {
             names.push(format!("... ({} in all)", self.channels.len()));
@@ -109,7 +109,7 @@ impl Header {
     /// The name of a column in a message; its number where the header left it empty.
     pub(super) fn column(&self, index: usize) -> String {
         match self.channels.get(index) {
-            Some(channel) if !channel.name.is_empty() => channel.to_string(),
+            Some(channel) if !channel.name.is_empty() => brief(&channel.to_string()),
             _ => (index + 1).to_string(),
         }
     }

@@ -61,8 +61,9 @@ pub use lattice::spacing;
 pub use reader::{
     BLOCK_ROWS, Block, LogReader, LogSummary, check_same_channels, check_same_sampling,
 };
-pub use record::Log;
+pub use record::{LARGEST_SIZE, Log};
 pub use roles::{RoleNeed, Roles};
+pub use sampling::is_sample_time;
 pub use source::Source;
 pub use table::{TableRoles, time_base_of};
 pub use writer::{CsvWriter, write_table};

@@ -49,6 +49,11 @@ impl RowParser {
         &self.header
     }
 
+    /// Bytes of the shortest row there can be: a separator or line end for each column, a digit for each with a role.
+    pub(super) fn shortest_row(&self) -> usize {
+        self.slots.len() + self.slots.iter().flatten().count()
+    }
+
     /// Parses lines of `text` (whole lines, the first being line `first_line` of the file) until the text or the
     /// room in `columns` (rows `from..limit` of each slot) ends. `cut_off`: the file's last line had no line end.
     pub(super) fn parse(

@@ -102,7 +102,9 @@ impl LogReader {
     }
 
     fn start(mut lines: Lines, roles: &Roles, need: RoleNeed) -> Result<Self, LogError> {
-        let header = Header::read(&mut lines)?;
+        // As in next_block: what is no text may be what damage left of it.
+        let header = Header::read(&mut lines).map_err(|error| lines.damage().unwrap_or(error));
+        let header = header?;
         let assigned = assign(roles, need, &header)?;
         let mut slots = vec![None; header.channels.len()];
         let channels = assigned.inputs.iter().chain(&assigned.outputs);
@@ -198,10 +200,6 @@ impl LogReader {
         }
         // The time stamps are the last slot for the length of this call.
         block.columns.push(std::mem::take(&mut self.times));
-        block
-            .columns
-            .iter_mut()
-            .for_each(|column| column.resize(BLOCK_ROWS, 0.0));
         let (rows, parsed) = self.parse_rows(&mut block.columns);
         block
             .columns
@@ -231,9 +229,12 @@ impl LogReader {
                 Ok(chunk) => chunk,
                 Err(error) => return (rows, Err(error)),
             };
-            let (done, result) = self
-                .parser
-                .parse(text, line, cut_off, columns, rows..BLOCK_ROWS);
+            // Room for what the text can hold, so that a file of many columns and few rows takes little memory.
+            let room = BLOCK_ROWS.min(rows + text.len() / self.parser.shortest_row() + 1);
+            for column in columns.iter_mut().filter(|column| column.len() < room) {
+                column.resize(room, 0.0);
+            }
+            let (done, result) = self.parser.parse(text, line, cut_off, columns, rows..room);
             rows += done.rows;
             self.lines.consume(done.bytes, done.lines);
             if result.is_err() {

@@ -7,6 +7,7 @@ use super::channel::Channel;
 use super::error::LogError;
 use super::reader::{Block, LogReader, check_same_channels, check_same_sampling};
 use super::roles::{RoleNeed, Roles};
+use super::sampling::is_sample_time;
 use super::source::Source;
 use super::writer::write_table;
 use crate::limits;
@@ -58,6 +59,9 @@ fn check_memory(reader: &LogReader) -> Result<(), LogError> {
     )?;
     Ok(())
 }
+/// Channels of this size and more, or that move by less than its inverse, are neither identified nor explained: a variance
+/// of a gain between two such channels, the fourth power, is still a number (1e240).
+pub const LARGEST_SIZE: f64 = 1e60;
 
 impl Log {
     /// Every channel's samples, inputs then outputs.
@@ -144,49 +148,64 @@ impl Log {
         input_data: Vec<Vec<f64>>,
         output_data: Vec<Vec<f64>>,
     ) -> Result<Self, LogError> {
-        if !(sample_time.is_finite() && sample_time > 0.0) {
+        let log = Self {
+            name: name.to_owned(),
+            sample_time,
+            start_time: 0.0,
+            inputs,
+            outputs,
+            input_data,
+            output_data,
+            sha256: None,
+        };
+        log.check()?;
+        Ok(log)
+    }
+
+    /// Whether this is a recording: its fields are open to be changed.
+    ///
+    /// # Errors
+    /// As [`Log::from_columns`].
+    pub fn check(&self) -> Result<(), LogError> {
+        let sample_time = self.sample_time;
+        if !is_sample_time(sample_time) {
             return Err(LogError::InvalidSampleTime { sample_time });
         }
-        let name = name.to_owned();
         for (role, channels, data) in [
-            ("input", &inputs, &input_data),
-            ("output", &outputs, &output_data),
+            ("input", &self.inputs, &self.input_data),
+            ("output", &self.outputs, &self.output_data),
         ] {
             let (expected, found) = (channels.len(), data.len());
             if expected != found {
                 return Err(LogError::ColumnCount {
-                    name,
+                    name: self.name.clone(),
                     role,
                     expected,
                     found,
                 });
             }
         }
-        let columns = || {
-            inputs
-                .iter()
-                .chain(&outputs)
-                .zip(input_data.iter().chain(&output_data))
-        };
-        let expected = columns().next().map_or(0, |(_, column)| column.len());
+        let expected = self.samples();
         if expected == 0 {
-            return Err(LogError::too_short(&name, 0, 1, "a recording"));
+            return Err(LogError::too_short(&self.name, 0, 1, "a recording"));
         }
-        for (channel, data) in columns() {
-            let (column, found) = (channel.to_string(), data.len());
-            if found != expected {
+        for (channel, data) in self
+            .inputs
+            .iter()
+            .chain(&self.outputs)
+            .zip(self.channel_data())
+        {
+            let (name, column) = (self.name.clone(), channel.to_string());
+            if data.len() != expected {
                 return Err(LogError::ColumnLength {
                     name,
                     column,
                     expected,
-                    found,
+                    found: data.len(),
                 });
             }
-            if let Some((sample, value)) = data
-                .iter()
-                .enumerate()
-                .find(|(_, value)| !value.is_finite())
-            {
+            let stray = data.iter().enumerate().find(|(_, v)| !v.is_finite());
+            if let Some((sample, value)) = stray {
                 return Err(LogError::ColumnNotFinite {
                     name,
                     column,
@@ -195,16 +214,7 @@ impl Log {
                 });
             }
         }
-        Ok(Self {
-            name,
-            sample_time,
-            start_time: 0.0,
-            inputs,
-            outputs,
-            input_data,
-            output_data,
-            sha256: None,
-        })
+        Ok(())
     }
 
     /// Number of samples N.

@@ -1,8 +1,11 @@
 //! Which column is an input, an output, the time.
 
+use std::collections::HashMap;
+
 use super::channel::Channel;
 use super::error::LogError;
 use super::header::Header;
+use super::sampling::is_sample_time;
 
 /// What the user asked for: `--inputs`, `--outputs`, `--time`, `--dt`. The default leaves all to the headers.
 ///
@@ -57,10 +60,7 @@ pub(super) struct Assigned {
 
 /// Finds the columns that `roles` and `need` ask for.
 pub(super) fn assign(roles: &Roles, need: RoleNeed, header: &Header) -> Result<Assigned, LogError> {
-    if let Some(sample_time) = roles
-        .sample_time
-        .filter(|dt| !(dt.is_finite() && *dt > 0.0))
-    {
+    if let Some(sample_time) = roles.sample_time.filter(|dt| !is_sample_time(*dt)) {
         return Err(LogError::InvalidSampleTime { sample_time });
     }
     let asked_time = roles
@@ -164,24 +164,23 @@ impl Assigned {
         let mut all = role("input", &self.inputs);
         all.extend(role("output", &self.outputs));
         all.extend(self.time.map(|column| ("time", column)));
-        for (k, (second, b)) in all.iter().enumerate() {
-            for (first, a) in all.iter().take(k) {
-                let (Some(one), Some(other)) = (header.channels.get(*a), header.channels.get(*b))
-                else {
-                    continue;
-                };
-                if a == b {
-                    let (name, column) = (header.name.clone(), one.to_string());
-                    return Err(LogError::ColumnGivenTwice {
-                        name,
-                        column,
-                        first,
-                        second,
-                    });
-                }
-                if one.name == other.name {
-                    return Err(header.duplicate(*a, *b));
-                }
+        let mut columns: HashMap<usize, &'static str> = HashMap::new();
+        let mut names: HashMap<&str, usize> = HashMap::new();
+        for (second, b) in all {
+            if let Some(first) = columns.insert(b, second) {
+                let (name, column) = (header.name.clone(), header.column(b));
+                return Err(LogError::ColumnGivenTwice {
+                    name,
+                    column,
+                    first,
+                    second,
+                });
+            }
+            let Some(channel) = header.channels.get(b) else {
+                continue;
+            };
+            if let Some(a) = names.insert(&channel.name, b) {
+                return Err(header.duplicate(a, b));
             }
         }
         Ok(())
@@ -281,6 +280,9 @@ fn default_time(header: &Header, taken: &[usize]) -> Option<usize> {
         .or_else(|| named(&|name| name == "T"))
 }
 
+/// Most bytes of names in an example of what to type.
+const LONGEST_EXAMPLE: usize = 1000;
+
 /// The error that shows what to type, made of the file's own headers: the last column as output, the rest as inputs.
 fn no_roles(header: &Header, time: Option<usize>, need: RoleNeed) -> LogError {
     let quote = |text: &str| {
@@ -304,8 +306,10 @@ fn no_roles(header: &Header, time: Option<usize>, need: RoleNeed) -> LogError {
         names.remove(0);
         example.push_str("--time 1 ");
     }
+    // Of many columns the example picks none.
+    let short = names.iter().map(|name| name.len()).sum::<usize>() < LONGEST_EXAMPLE;
     let (inputs, output) = match names.split_last() {
-        Some((last, rest)) if !rest.is_empty() => (rest.join(","), (*last).to_owned()),
+        Some((last, rest)) if !rest.is_empty() && short => (rest.join(","), (*last).to_owned()),
         _ => ("a,b".to_owned(), "c".to_owned()),
     };
     example.push_str(&match need {

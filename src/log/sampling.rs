@@ -6,6 +6,15 @@
 use super::error::LogError;
 use super::header::Header;
 
+/// Shortest and longest sample time, in seconds: from the fastest that light can be gated to longer than there has been
+/// time. Beyond, frequencies and times of what was sampled leave the range of numbers.
+const SAMPLE_TIMES: std::ops::RangeInclusive<f64> = 1e-18..=1e18;
+
+/// Whether this can be a sample time, in seconds.
+pub fn is_sample_time(seconds: f64) -> bool {
+    SAMPLE_TIMES.contains(&seconds)
+}
+
 /// How far one step may be off, relative to the sample time.
 const STEP_TOLERANCE: f64 = 0.01;
 /// A step beyond this many sample times means that samples are missing.
@@ -115,6 +124,9 @@ impl Sampling {
         let resolution = 4.0 * f64::EPSILON * self.first.abs().max(self.last.abs()) / steps;
         let sample_time = shortest_within(mean, resolution);
         self.check_drift(header, mean)?;
+        if !is_sample_time(sample_time) {
+            return Err(LogError::InvalidSampleTime { sample_time });
+        }
         Ok((sample_time, self.first))
     }
 

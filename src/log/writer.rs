@@ -9,6 +9,7 @@ use flate2::write::GzEncoder;
 use super::atomic::AtomicFile;
 use super::channel::Channel;
 use super::error::LogError;
+use super::sampling::is_sample_time;
 
 enum Encoder {
     Plain(AtomicFile),
@@ -63,7 +64,7 @@ impl CsvWriter {
         start_time: f64,
         channels: impl IntoIterator<Item = &'a Channel>,
     ) -> Result<Self, LogError> {
-        if !(sample_time.is_finite() && sample_time > 0.0) {
+        if !is_sample_time(sample_time) {
             return Err(LogError::InvalidSampleTime { sample_time });
         }
         let file = AtomicFile::create(path)?;

@@ -36,7 +36,9 @@ pub enum ModelError {
         value: f64,
     },
     /// The sample time is not a positive number.
-    #[error("the sample time must be a positive number of seconds, not {value}")]
+    #[error(
+        "the sample time must be a positive number of seconds, between 1e-18 and 1e18, not {value}"
+    )]
     SampleTime {
         /// The sample time given.
         value: f64,

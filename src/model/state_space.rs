@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::DMatrix;
 
 use super::error::ModelError;
+use crate::log::is_sample_time;
 
 /// Linear time-invariant system in innovation form,
 ///
@@ -60,7 +61,7 @@ impl StateSpace {
         for (name, matrix) in [("A", &a), ("B", &b), ("C", &c), ("D", &d), ("K", &k)] {
             check_finite(name, matrix)?;
         }
-        if !(sample_time.is_finite() && sample_time > 0.0) {
+        if !is_sample_time(sample_time) {
             return Err(ModelError::SampleTime { value: sample_time });
         }
         Ok(Self {
@@ -254,7 +255,7 @@ mod tests {
         let error =
             StateSpace::deterministic(a, s.b.clone(), s.c.clone(), s.d.clone(), 0.1).unwrap_err();
         assert!(error.to_string().starts_with("A[2, 1] is NaN"));
-        for time in [0.0, -1.0, f64::INFINITY, f64::NAN] {
+        for time in [0.0, -1.0, 1e-300, 1e300, f64::INFINITY, f64::NAN] {
             let made =
                 StateSpace::deterministic(s.a.clone(), s.b.clone(), s.c.clone(), s.d.clone(), time);
             assert!(matches!(made, Err(ModelError::SampleTime { .. })));

@@ -4,6 +4,17 @@ use std::io;
 
 use crate::limits::LimitError;
 
+/// So many characters of what a document says are repeated in a message, at most.
+const MOST_REPEATED: usize = 400;
+
+/// What a document says, cut short where it is long.
+pub(super) fn repeated(text: &str) -> String {
+    match text.char_indices().nth(MOST_REPEATED) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
 /// A document that cannot be read, or a model that cannot be written as one.
 ///
 /// A message starts with the file and, where there is one, line, column and key.

@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::covariance::{ParameterCovariance, ParameterLayout};
 
+/// Degrees of freedom that a covariance may have: blocks of a jackknife less one.
+const FREEDOM: std::ops::RangeInclusive<f64> = 1.0..=1e6;
+
 /// What is said about every such covariance.
 const NOTE: &str = "bound to the state basis of A, B, C, D, K in this document; of what does not depend on the \
                     basis, `invariants` and `innovant show` give the uncertainty";
@@ -96,6 +99,18 @@ impl CovarianceDocument {
             let (row, column) = (i.max(j), i.min(j));
             self.scale * self.packed_lower_triangle[row * (row + 1) / 2 + column]
         });
+        if let Some(row) = (0..length).find(|i| matrix[(*i, *i)] < 0.0) {
+            return Err(format!(
+                "entry {0}, {0} is {1}, and a variance is not negative",
+                row + 1,
+                matrix[(row, row)]
+            ));
+        }
+        if let Some(freedom) = self.degrees_of_freedom.filter(|f| !FREEDOM.contains(f)) {
+            return Err(format!(
+                "`degrees_of_freedom` is {freedom}; it is null, or from 1 to 1e6"
+            ));
+        }
         ParameterCovariance::new(layout, matrix, self.degrees_of_freedom)
             .map_err(|error| error.to_string())
     }

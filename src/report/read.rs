@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde_json::error::Category;
 
 use super::channels::{InputDocument, OutputDocument};
-use super::error::DocumentError;
+use super::error::{DocumentError, repeated};
 use super::location::{offset, path_at, position_of};
 use super::model_document::{MODEL_FORMAT, ModelDocument};
 use crate::identify::{IdentifiedChannel, Model, Summary};
@@ -95,7 +95,7 @@ pub fn parse_model(name: &str, text: &str) -> Result<ReadModel, DocumentError> {
             .map(|at| format!(", line {}, column {}", at.line, at.column))
             .unwrap_or_default(),
         key,
-        message,
+        message: repeated(&message),
     })?;
     Ok(ReadModel { model, document })
 }
@@ -135,7 +135,7 @@ fn wrong_format(name: &str, format: &serde_json::Value) -> DocumentError {
     };
     DocumentError::Format {
         name: name.to_owned(),
-        found,
+        found: repeated(&found),
         expected: MODEL_FORMAT,
         advice,
     }
@@ -179,9 +179,9 @@ pub(super) fn broken(name: &str, text: &str, error: &serde_json::Error) -> Docum
         key: if path.is_empty() {
             String::new()
         } else {
-            format!(", key `{path}`")
+            format!(", key `{}`", repeated(&path))
         },
-        message,
+        message: repeated(&message),
         advice,
     }
 }

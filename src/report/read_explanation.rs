@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use super::error::DocumentError;
+use super::error::{DocumentError, repeated};
+use super::location::position_of;
 use super::read::{broken, no_document};
 use crate::explain::{EXPLANATION_FORMAT, Explanation};
 
@@ -13,6 +14,7 @@ pub fn is_explanation(text: &str) -> bool {
     struct Probe {
         format: String,
     }
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     serde_json::from_str::<Probe>(text).is_ok_and(|p| p.format.starts_with("innovant-explanation/"))
 }
 
@@ -36,6 +38,7 @@ pub fn read_explanation(path: &Path) -> Result<Explanation, DocumentError> {
 /// # Errors
 /// [`DocumentError`] names file, line, column and key.
 pub fn parse_explanation(name: &str, text: &str) -> Result<Explanation, DocumentError> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     if !text.trim_start().starts_with('{') {
         return Err(no_document(name, text));
     }
@@ -44,11 +47,22 @@ pub fn parse_explanation(name: &str, text: &str) -> Result<Explanation, Document
     if explanation.format != EXPLANATION_FORMAT {
         return Err(DocumentError::Format {
             name: name.to_owned(),
-            found: explanation.format,
+            found: repeated(&explanation.format),
             expected: EXPLANATION_FORMAT,
             advice: "it was written by another version of innovant: update this one, or explain the recording again",
         });
     }
+    explanation
+        .model
+        .check()
+        .map_err(|error| DocumentError::Content {
+            name: name.to_owned(),
+            place: position_of(text, "model")
+                .map(|at| format!(", line {}, column {}", at.line, at.column))
+                .unwrap_or_default(),
+            key: "model".to_owned(),
+            message: repeated(&error.to_string()),
+        })?;
     Ok(explanation)
 }
 

@@ -59,6 +59,48 @@ impl Question {
         scaled
     }
 
+    /// The same question with a time unit `unit` seconds long, in recording and simulation.
+    pub fn in_time_of(&self, unit: f64) -> Self {
+        let mut slower = self.clone();
+        let stretch = |log: &mut Log| log.sample_time *= unit;
+        stretch(&mut slower.recording);
+        match &mut slower.simulation {
+            Simulation::Model(model, _) => model.system.sample_time *= unit,
+            Simulation::Outputs(logs) => logs.iter_mut().for_each(stretch),
+        }
+        slower
+    }
+
+    /// The same question with all channels in the opposite order.
+    pub fn turned(&self) -> Self {
+        let mut turned = self.clone();
+        let turn = |log: &mut Log| {
+            log.inputs.reverse();
+            log.input_data.reverse();
+            log.outputs.reverse();
+            log.output_data.reverse();
+        };
+        turn(&mut turned.recording);
+        match &mut turned.simulation {
+            Simulation::Model(model, _) => {
+                model.inputs.reverse();
+                model.outputs.reverse();
+                let system = &mut model.system;
+                let flip = |m: &DMatrix<f64>, rows: bool, columns: bool| {
+                    DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| {
+                        let i = if rows { m.nrows() - 1 - i } else { i };
+                        m[(i, if columns { m.ncols() - 1 - j } else { j })]
+                    })
+                };
+                system.b = flip(&system.b, false, true);
+                system.c = flip(&system.c, true, false);
+                system.d = flip(&system.d, true, true);
+            }
+            Simulation::Outputs(logs) => logs.iter_mut().for_each(turn),
+        }
+        turned
+    }
+
     /// The same question with another time of the first sample.
     pub fn starting_at(&self, time: f64) -> Self {
         let mut moved = self.clone();

@@ -126,7 +126,7 @@ impl Method {
             Self::PbsidOpt | Self::Whitening | Self::InnovationEstimation | Self::Pem => 1,
             Self::Knudsen => knudsen::SMALLEST_PAST,
             // n states are seen over n / l samples, and the future window is shifted by one.
-            Self::Subid => order.div_ceil(outputs) + 2,
+            Self::Subid => order.div_ceil(outputs).saturating_add(2),
         }
     }
 

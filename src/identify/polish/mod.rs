@@ -30,8 +30,14 @@ use crate::linalg::{LinalgError, all_finite, cholesky_upper, multiply_nt, solve_
 use crate::model::StateSpace;
 
 /// The iteration ends when a step promises less than this in the cost, which is in units of chi-square: the
-/// parameters are then within 1e-6 standard deviations of the minimum, whatever start they came from.
-const DECREASE: f64 = 1e-12;
+/// parameters are then within 1e-10 standard deviations of the minimum, whatever start they came from.
+const DECREASE: f64 = 1e-20;
+/// Of steps that promise less than this, the costs differ by little more than their rounding (1e-16 of a cost of 100 is
+/// 1e-14): choosing among them would be chance, and two starts that differ by rounding would end 1e-6 standard deviations
+/// apart. From here on the plain step is taken, as long as each promises less than the one before.
+const PLAIN: f64 = 1e-10;
+/// The referee of an order needs no more.
+const REFEREE_DECREASE: f64 = 1e-12;
 /// A Gauss-Newton iteration that has not ended by then will not.
 const ITERATIONS: usize = 60;
 /// Lengths of the Gauss-Newton step that are tried.
@@ -42,8 +48,11 @@ const LENGTHS: [f64; 3] = [1.0, 0.5, 0.25];
 /// a large share of them, a decade is too coarse: along a curved valley the longest step that still leads down counts.
 const DAMPINGS: [(i32, i32, i32); 2] = [(-10, -6, 1), (-5, 0, 4)];
 /// Steps in a row that each gain less than [`GAIN`] end the iteration: a flat valley, where the cost, and
-/// with it every prediction, no longer changes.
+/// with it every prediction, no longer changes. Steps that come to the minimum gain little too, but each promises less than
+/// [`NEARING`] of the one before.
 const FLAT_STEPS: usize = 3;
+/// See [`FLAT_STEPS`].
+const NEARING: f64 = 0.5;
 /// See [`FLAT_STEPS`]; in units of chi-square.
 const GAIN: f64 = 1e-5;
 
@@ -109,7 +118,9 @@ pub fn polish(
     let mut slow = 0;
     let degrees_of_freedom = (layout.outputs * varx.regressors()).saturating_sub(rank);
     let hopeless = HOPELESS * degrees_of_freedom as f64;
-    let mut converged = false;
+    let converged;
+    let mut promised = f64::INFINITY;
+    let exact = effort == Effort::Full && largest_radius.is_none();
     let covariance = loop {
         system = balanced(&system, varx.past);
         let jacobian = problem.jacobian(&system);
@@ -124,15 +135,32 @@ pub fn polish(
             None => DMatrix::zeros(0, layout.len()),
         };
         let linearised = linearise(jacobian, residual.as_slice(), rank, &boundary)?;
-        if linearised.decrease() < DECREASE || flat == FLAT_STEPS {
+        let before = std::mem::replace(&mut promised, linearised.decrease());
+        let plain = promised < PLAIN && exact;
+        let enough = if plain { DECREASE } else { REFEREE_DECREASE };
+        // Plain steps that no longer shrink have met the rounding of the residual.
+        if promised < enough || flat == FLAT_STEPS || (plain && promised >= before) {
             converged = true;
             break linearised.covariance();
         }
         if iterations == ITERATIONS || (effort == Effort::Referee && slow == FLAT_STEPS) {
+            converged = plain;
             break linearised.covariance();
         }
         iterations += 1;
         let theta = layout.pack(&system);
+        if plain {
+            let step = linearised.step(0.0);
+            let moved: Vec<f64> = theta.iter().zip(step.iter()).map(|(v, s)| v + s).collect();
+            let candidate = layout.unpack(&moved, &system);
+            let candidate_cost = problem.cost(&candidate);
+            if !candidate_cost.is_finite() {
+                converged = true;
+                break linearised.covariance();
+            }
+            (system, cost) = (candidate, candidate_cost);
+            continue;
+        }
         // A cost is cheap beside a Jacobian: try all, take the best.
         let better = tries()
             .filter_map(|(length, damping)| {
@@ -152,7 +180,8 @@ pub fn polish(
             .min_by(|a, b| a.1.total_cmp(&b.1));
         match better {
             Some((candidate, candidate_cost)) => {
-                flat = if cost - candidate_cost < GAIN {
+                let nearing = exact && promised < NEARING * before;
+                flat = if cost - candidate_cost < GAIN && !nearing {
                     flat + 1
                 } else {
                     0

@@ -1,0 +1,9 @@
+#![no_main]
+
+#[path = "../bound.rs"]
+mod bound;
+#[allow(dead_code, unused_imports, reason = "each target is one of five")]
+#[path = "../../tests/hostile/mod.rs"]
+mod hostile;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| hostile::explanation_json(bytes));
