@@ -174,6 +174,28 @@ impl Data {
             }
         };
         for c in 0..q {
+            let largest = |of: &dyn Fn(&LagMoments) -> f64| {
+                // NaN is what infinite sums leave: as large as can be.
+                self.experiments
+                    .iter()
+                    .map(of)
+                    .map(|v| if v.is_nan() { f64::INFINITY } else { v.abs() })
+                    .fold(0.0, f64::max)
+            };
+            let level = largest(&|moments| moments.mean()[c]);
+            let deviation = largest(&|moments| moments.standard_deviation()[c]);
+            let size = || {
+                let (role, name) = channel(c);
+                IdentifyError::Size {
+                    role,
+                    name,
+                    level,
+                    deviation,
+                }
+            };
+            if level.max(deviation) >= LARGEST_SIZE {
+                return Err(size());
+            }
             // A channel has to move in at least one experiment.
             let moves = self.experiments.iter().any(|moments| {
                 let deviation = moments.standard_deviation()[c];
@@ -192,24 +214,8 @@ impl Data {
                     },
                 });
             }
-            let largest = |of: &dyn Fn(&LagMoments) -> f64| {
-                // NaN is what infinite sums leave: as large as can be.
-                self.experiments
-                    .iter()
-                    .map(of)
-                    .map(|v| if v.is_nan() { f64::INFINITY } else { v.abs() })
-                    .fold(0.0, f64::max)
-            };
-            let level = largest(&|moments| moments.mean()[c]);
-            let deviation = largest(&|moments| moments.standard_deviation()[c]);
-            if level.max(deviation) >= LARGEST_SIZE || deviation < 1.0 / LARGEST_SIZE {
-                let (role, name) = channel(c);
-                return Err(IdentifyError::Size {
-                    role,
-                    name,
-                    level,
-                    deviation,
-                });
+            if deviation < 1.0 / LARGEST_SIZE {
+                return Err(size());
             }
         }
         for j in 0..q {

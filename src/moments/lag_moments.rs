@@ -66,15 +66,15 @@ impl LagMoments {
             .collect()
     }
 
-    /// Root mean square of each channel about its mean.
+    /// Root mean square of each channel about its mean; NaN where its squares leave the range of numbers.
     pub fn standard_deviation(&self) -> Vec<f64> {
         let n = self.samples.max(1) as f64;
         (0..self.channels)
             .map(|c| {
                 let mean = self.sum[c] / n;
-                (self.correlations[0][(c, c)] / n - mean * mean)
-                    .max(0.0)
-                    .sqrt()
+                let variance = self.correlations[0][(c, c)] / n - mean * mean;
+                // Rounding makes a variance of nothing negative.
+                if variance < 0.0 { 0.0 } else { variance.sqrt() }
             })
             .collect()
     }

@@ -41,7 +41,7 @@ class Moments:
     >>> first = innovant.Moments(u[:1500], y[:1500], dt=dt)
     >>> second = innovant.Moments(u[1500:], y[1500:], dt=dt, keep=0)
     >>> model = first.append(second).identify()
-    >>> bool(np.abs(model.A - innovant.identify(u, y, dt=dt).A).max() < 1e-8)
+    >>> bool(np.abs(model.A - innovant.identify(u, y, dt=dt).A).max() < 1e-10)
     True
     """
 
