@@ -32,15 +32,17 @@ fn document(model: &Model) -> String {
     ModelDocument::new(model).unwrap().to_json().unwrap()
 }
 
+/// A search over the samples has no one end along a state that the recording does not show, so its order is chosen.
 fn options_of(method: Method) -> Options {
+    let automatic = matches!(method, Method::PbsidOpt | Method::Pem);
     Options {
         method,
-        order: if method == Method::PbsidOpt {
+        order: if automatic {
             Order::Auto
         } else {
             Order::Fixed(3)
         },
-        past: (method != Method::PbsidOpt).then_some(12),
+        past: (!automatic).then_some(12),
         ..Options::default()
     }
 }

@@ -177,9 +177,9 @@ fn kinds() -> Vec<Kind> {
     // Inputs through low-pass filters in series: condition of the data factor 1e2, 1e4, 3e5, 2e8.
     for (name, must, runs, pole, order) in [
         ("coloured, 1 pole at 0.9", Must::Trust, 24, 0.9, 1),
-        ("coloured, 2 poles at 0.97", Must::Trust, 12, 0.97, 2),
-        ("coloured, 4 poles at 0.9", Must::Trust, 4, 0.9, 4),
-        ("coloured, 4 poles at 0.99", Must::BeHonest, 2, 0.99, 4),
+        ("coloured, 2 poles at 0.97", Must::Trust, 6, 0.97, 2),
+        ("coloured, 4 poles at 0.9", Must::Trust, 2, 0.9, 4),
+        ("coloured, 4 poles at 0.99", Must::BeHonest, 1, 0.99, 4),
     ] {
         let low_pass: Record = Box::new(move |plant, seed| coloured(plant, seed, pole, order));
         add(name, must, runs, &open, &SPREAD, low_pass);
@@ -241,7 +241,7 @@ fn kinds() -> Vec<Kind> {
     add(
         "12 outputs from 8 inputs",
         Must::BeHonest,
-        2,
+        1,
         &wide,
         &SPREAD,
         plain(4000),

@@ -286,7 +286,7 @@ fn impossible_requests_are_refused_with_a_reason() {
             past: Some(usize::MAX),
             ..Options::default()
         }),
-        IdentifyError::Horizon { .. }
+        IdentifyError::Limit(_)
     ));
     let mut same = log.clone();
     same.output_data[1] = same.input_data[0].iter().map(|u| 3.0 * u - 7.0).collect();

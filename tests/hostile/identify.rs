@@ -62,6 +62,9 @@ fn size(bytes: &mut Bytes) -> usize {
     }
 }
 
+/// What `fuzz/run.sh` allows in one piece.
+const MEMORY: u64 = 256 << 20;
+
 fn options(bytes: &mut Bytes) -> Options {
     if bytes.byte() < 64 {
         return Options::default();
@@ -90,5 +93,6 @@ fn options(bytes: &mut Bytes) -> Options {
         },
         stable: bytes.flag(),
         seed: bytes.word(),
+        memory_limit: Some(MEMORY),
     }
 }
