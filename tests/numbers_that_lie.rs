@@ -31,13 +31,16 @@ enum Must {
     BeHonest,
 }
 
+/// A recording of a plant, by its seed.
+type Record = Box<dyn Fn(&TestSystem, u64) -> Log + Sync>;
+
 struct Kind {
     name: &'static str,
     must: Must,
     runs: u64,
     plant: TestSystem,
     frequencies: Vec<f64>,
-    record: Box<dyn Fn(&TestSystem, u64) -> Log + Sync>,
+    record: Record,
 }
 
 #[derive(Default, Clone, Copy)]
@@ -311,8 +314,6 @@ fn kinds() -> Vec<Kind> {
     );
     kinds
 }
-
-type Record = Box<dyn Fn(&TestSystem, u64) -> Log + Sync>;
 
 fn plain(samples: usize) -> Record {
     Box::new(move |plant, seed| plant.record(samples, seed))
