@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from . import _innovant, frames, html
 from ._innovant import InnovantError
 from .frames import Array
-from .model import Model, document
+from .model import Model, document, written
 from .record import Record, read
 
 
@@ -101,10 +101,7 @@ class Explanation:
 
     def to_json(self, path: str | Path | None = None) -> str:
         """The document `innovant-explanation/1`, as the command line writes it; also into a file."""
-        text = self._core.to_json()
-        if path is not None:
-            Path(path).write_text(text, encoding="utf-8")
-        return text
+        return written(self._core.to_json(), path)
 
     @classmethod
     def from_json(cls, source: str | Path) -> Explanation:

@@ -338,10 +338,7 @@ class Model:
 
     def to_json(self, path: str | Path | None = None) -> str:
         """The document `innovant-model/1`, as the command line writes it; also into a file."""
-        text = self._core.to_json()
-        if path is not None:
-            Path(path).write_text(text, encoding="utf-8")
-        return text
+        return written(self._core.to_json(), path)
 
     @classmethod
     def from_json(cls, source: str | Path) -> Model:
@@ -376,6 +373,13 @@ def document(source: str | Path) -> tuple[str, str]:
         return str(source), Path(source).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InnovantError(f"{source}: cannot open: {error}; check the path and its permissions") from None
+
+
+def written(text: str, path: str | Path | None) -> str:
+    """The text of a document, which a file is given as well where there is a path."""
+    if path is not None:
+        Path(path).write_text(text, encoding="utf-8")
+    return text
 
 
 def _without_unit(header: str) -> str:

@@ -23,6 +23,7 @@ mod library;
 mod number;
 mod plot;
 pub(in crate::report) mod reproduction;
+mod source;
 mod thin;
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::number::{exact, fixed, number, p_value, percent, share, with_unit};
+use super::source::Source;
 use super::words::{capitalised, effect_name, listed};
 use crate::explain::{Explanation, NoiseFound};
 use crate::log::Channel;
@@ -22,14 +23,6 @@ pub(super) struct Left {
 pub(super) struct Provenance {
     recordings: Vec<Source>,
     facts: Vec<(&'static str, String)>,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct Source {
-    name: String,
-    samples: usize,
-    start: String,
-    sha256: Option<String>,
 }
 
 /// The test of what is left.
@@ -141,16 +134,7 @@ pub(super) fn provenance(of: &Explanation) -> Provenance {
     facts.push(("Format of the document", of.format.clone()));
     facts.retain(|(_, value)| !value.is_empty());
     Provenance {
-        recordings: of
-            .recordings
-            .iter()
-            .map(|r| Source {
-                name: r.name.clone(),
-                samples: r.samples,
-                start: with_unit(&exact(r.start_time), "s"),
-                sha256: r.sha256.clone(),
-            })
-            .collect(),
+        recordings: Source::all(&of.recordings),
         facts,
     }
 }

@@ -23,7 +23,7 @@ pub(crate) mod fixtures;
 #[cfg(test)]
 mod tests;
 
-use super::{PageError, head, number, plot, render};
+use super::{PageError, head, number, plot, render, source};
 use crate::explain::Explanation;
 
 const TEMPLATES: [(&str, &str); 2] = [

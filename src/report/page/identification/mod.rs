@@ -20,7 +20,7 @@ mod view;
 #[cfg(test)]
 mod tests;
 
-use super::{PageError, head, number, plot, render};
+use super::{PageError, head, number, plot, render, source};
 use crate::identify::Model;
 use crate::report::Overview;
 use crate::validate::Validation;

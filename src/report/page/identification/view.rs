@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::head::{Head, Table, sections};
 use super::number::{exact, with_unit};
 use super::plot::Group;
+use super::source::Source;
 use super::{PageError, order, poles, recording, residuals, response};
 use crate::covariance::invariants;
 use crate::identify::{IdentifiedChannel, Model};
@@ -46,14 +47,6 @@ pub(super) struct View {
     recordings: Vec<Group>,
     sources: Vec<Source>,
     facts: Vec<(&'static str, String)>,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct Source {
-    name: String,
-    samples: usize,
-    start: String,
-    sha256: Option<String>,
 }
 
 /// The page of a model.
@@ -154,16 +147,7 @@ pub(super) fn view(
         strongest: tables.as_ref().and_then(|t| Table::of(&t.1, "Strongest correlations")),
         residuals: tests.map(residuals::pictures).unwrap_or_default(),
         recordings,
-        sources: model
-            .recordings
-            .iter()
-            .map(|r| Source {
-                name: r.name.clone(),
-                samples: r.samples,
-                start: with_unit(&exact(r.start_time), "s"),
-                sha256: r.sha256.clone(),
-            })
-            .collect(),
+        sources: Source::all(&model.recordings),
         facts: vec![
             ("Inputs", listed(&model.inputs)),
             ("Outputs", listed(&model.outputs)),
