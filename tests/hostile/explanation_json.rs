@@ -124,7 +124,7 @@ fn dressed(document: &mut Value, bytes: &mut Bytes) {
                 .parameters
                 .iter()
                 .map(|p| match bytes.byte() {
-                    0..=127 => (p.lower.max(0.01) * p.upper.min(1.0).max(0.0)).sqrt(),
+                    0..=127 => (p.lower.max(0.01) * p.upper.clamp(0.0, 1.0)).sqrt(),
                     128..=159 => p.lower,
                     160..=191 => p.upper,
                     _ => bytes.finite(),
