@@ -85,3 +85,15 @@ pub fn proposal(evidence: &[OrderEvidence]) -> Option<usize> {
         })
         .map(|e| e.order)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `n (r + 2 l)` numbers: `A`, `B`, `C` and `K` less the choice of the state basis.
+    #[test]
+    fn an_order_costs_its_parameters() {
+        let price = penalty(3, 2, 1, 1000);
+        assert!((price - 12.0 * 1000_f64.ln() / 1000.0).abs() < 1e-15);
+    }
+}
