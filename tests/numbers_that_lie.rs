@@ -180,8 +180,8 @@ fn kinds() -> Vec<Kind> {
     // Inputs through low-pass filters in series: condition of the data factor 1e2, 1e4, 3e5, 2e8.
     for (name, must, runs, pole, order) in [
         ("coloured, 1 pole at 0.9", Must::Trust, 24, 0.9, 1),
-        ("coloured, 2 poles at 0.97", Must::Trust, 6, 0.97, 2),
-        ("coloured, 4 poles at 0.9", Must::Trust, 2, 0.9, 4),
+        ("coloured, 2 poles at 0.97", Must::Trust, 4, 0.97, 2),
+        ("coloured, 4 poles at 0.9", Must::Trust, 1, 0.9, 4),
         ("coloured, 4 poles at 0.99", Must::BeHonest, 1, 0.99, 4),
     ] {
         let low_pass: Record = Box::new(move |plant, seed| coloured(plant, seed, pole, order));
@@ -247,7 +247,7 @@ fn kinds() -> Vec<Kind> {
         1,
         &wide,
         &SPREAD,
-        plain(4000),
+        plain(2000),
     );
 
     // Rounded by the logger: the controller knew better.
