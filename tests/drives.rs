@@ -21,6 +21,7 @@ use innovant::identify::IdentifiedChannel;
 use innovant::log::{Channel, Log};
 use innovant::model::StateSpace;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use servo::{Drive, Missing, Recorded, STEP};
 
 fn log(name: &str, recorded: &Recorded) -> Log {
@@ -82,58 +83,94 @@ fn from_environment(name: &str, otherwise: u64) -> u64 {
         .unwrap_or(otherwise)
 }
 
+/// What was said of one drive.
+struct Answer {
+    missing: Missing,
+    verdict: Verdict,
+    names: Vec<String>,
+    /// As a share of the true one.
+    mass: f64,
+    /// Of a free run on a fresh recording, in percent.
+    fit: f64,
+    line: String,
+}
+
+fn ask(missing: Missing, speed: bool, mut dice: Dice) -> Answer {
+    let drive = Drive::draw(missing, speed, &mut dice);
+    let recording = log("drive", &drive.record(&mut dice));
+    let fresh = drive.record(&mut dice);
+    let model = nominal(&drive, &mut dice);
+    let simulation = Simulation::Model(Box::new(model), "nominal".to_owned());
+    let said = explain(&[recording], &simulation, &Options::default()).unwrap();
+    let names: Vec<String> = said.effects.iter().map(|e| e.effect.clone()).collect();
+    let ran = said.model.simulate(&[&fresh.input], None, None).unwrap();
+    let fit = fit_percent(&fresh.output, &ran[0]);
+    let mass = said
+        .model
+        .mechanics
+        .as_ref()
+        .map_or(f64::NAN, |m| m.mass.value / drive.mass);
+    let line = format!(
+        "{missing:?}{}: {:?} {names:?}, mass {mass:.4}, fresh free run {fit:.1} %",
+        if speed { " (speed)" } else { "" },
+        said.verdict
+    );
+    Answer {
+        missing,
+        verdict: said.verdict,
+        names,
+        mass,
+        fit,
+        line,
+    }
+}
+
 #[test]
 fn what_drives_lack_is_named_with_their_mass() {
-    let (mut right, mut wrong, mut effects, mut alarms, mut masses) = (0, 0, 0, 0, 0);
-    let mut fits = Vec::new();
     let each = from_environment("INNOVANT_DRIVES", 1);
     let seed = from_environment("INNOVANT_DRIVES_SEED", 11);
-    let mut total = 0;
-    for (kind, missing) in Missing::ALL.into_iter().enumerate() {
-        for number in 0..each {
-            for speed in [false, true] {
+    let questions: Vec<(Missing, bool, Dice)> = Missing::ALL
+        .into_iter()
+        .enumerate()
+        .flat_map(|(kind, missing)| {
+            (0..each).flat_map(move |number| {
                 // Laws of the position need one that is measured.
-                if speed && matches!(missing, Missing::Cubic | Missing::Cogging) {
-                    continue;
-                }
-                let mut dice = Dice::new(seed, 100 * kind as u64 + 2 * number + u64::from(speed));
-                let drive = Drive::draw(missing, speed, &mut dice);
-                let recording = log("drive", &drive.record(&mut dice));
-                let fresh = drive.record(&mut dice);
-                let model = nominal(&drive, &mut dice);
-                let simulation = Simulation::Model(Box::new(model), "nominal".to_owned());
-                let said = explain(&[recording], &simulation, &Options::default()).unwrap();
-                let names: Vec<&str> = said.effects.iter().map(|e| e.effect.as_str()).collect();
-                let ran = said.model.simulate(&[&fresh.input], None, None).unwrap();
-                let fit = fit_percent(&fresh.output, &ran[0]);
-                let mass = said
-                    .model
-                    .mechanics
-                    .as_ref()
-                    .map_or(f64::NAN, |m| m.mass.value / drive.mass);
-                println!(
-                    "{missing:?}{}: {:?} {names:?}, mass {mass:.4}, fresh free run {fit:.1} %",
-                    if speed { " (speed)" } else { "" },
-                    said.verdict
-                );
-                total += 1;
-                masses += usize::from((mass - 1.0).abs() < 0.03);
-                fits.push(fit);
-                let named = matches!(said.verdict, Verdict::Named | Verdict::Family);
-                if missing == Missing::Nothing {
-                    alarms += usize::from(named);
-                } else {
-                    effects += 1;
-                    right += usize::from(names.first() == Some(&missing.id()) && names.len() == 1);
-                    wrong += usize::from(named && !names.contains(&missing.id()));
-                }
-            }
+                let measured = matches!(missing, Missing::Cubic | Missing::Cogging);
+                [false, true]
+                    .into_iter()
+                    .filter(move |speed| !(*speed && measured))
+                    .map(move |speed| {
+                        let stream = 100 * kind as u64 + 2 * number + u64::from(speed);
+                        (missing, speed, Dice::new(seed, stream))
+                    })
+            })
+        })
+        .collect();
+    let answers: Vec<Answer> = questions
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|(missing, speed, dice)| ask(missing, speed, dice))
+        .collect();
+    let (mut right, mut wrong, mut effects, mut alarms, mut masses) = (0, 0, 0, 0, 0);
+    for answer in &answers {
+        println!("{}", answer.line);
+        masses += usize::from((answer.mass - 1.0).abs() < 0.03);
+        let named = matches!(answer.verdict, Verdict::Named | Verdict::Family);
+        if answer.missing == Missing::Nothing {
+            alarms += usize::from(named);
+            continue;
         }
+        let truth = answer.missing.id();
+        effects += 1;
+        right += usize::from(answer.names == [truth]);
+        wrong += usize::from(named && !answer.names.iter().any(|name| name == truth));
     }
+    let mut fits: Vec<f64> = answers.iter().map(|answer| answer.fit).collect();
     fits.sort_by(f64::total_cmp);
     println!(
-        "{right} of {effects} named alone, {wrong} wrong, {alarms} false alarms; mass within 3 % in {masses} of {total}; fresh \
+        "{right} of {effects} named alone, {wrong} wrong, {alarms} false alarms; mass within 3 % in {masses} of {}; fresh \
          free run {:.1} % (median)",
+        answers.len(),
         fits[fits.len() / 2]
     );
     assert_eq!(alarms, 0);

@@ -31,8 +31,8 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// A free-run fit always follows its own recording better than an averaged equation does; by this factor it has found
-/// what the equation lacks.
+/// A free-run fit must run through the half of the recording that it was not fitted to with an error this many times that of
+/// the averaged equation to stand in its place: it follows its own half better always, and knows no mass.
 const MUCH_BETTER: f64 = 0.5;
 
 /// What an averaged equation leaves is mostly noise below this share of structure.
@@ -69,8 +69,8 @@ pub fn explain(
         .then(|| inquire(&known.data, &known.structure, &allowed))
         .flatten();
     let (known, finding, mask) = match (drive, ordinary) {
-        (Some((_, averaged, _)), Some((finding, mask)))
-            if tells_more(&finding, &averaged, &known.data) =>
+        (Some((drive, averaged, _)), Some((finding, mask)))
+            if tells_more((&finding, &known.data), (&averaged, &drive.data)) =>
         {
             (known, finding, mask)
         }
@@ -93,7 +93,8 @@ pub fn explain(
 }
 
 /// Whether a free-run fit tells more of a drive than its averaged equation, which leaves structure.
-fn tells_more(free_run: &Finding, averaged: &Finding, data: &Data) -> bool {
+fn tells_more(free_run: (&Finding, &Data), averaged: (&Finding, &Data)) -> bool {
+    let ((free_run, fitted), (equation, whole)) = (free_run, averaged);
     // Where a free run drifts, a trend stands for whatever it misses.
     let trend = free_run.model.structure.new_effects().iter().any(|e| {
         matches!(
@@ -101,12 +102,24 @@ fn tells_more(free_run: &Finding, averaged: &Finding, data: &Data) -> bool {
             "sensor_drift" | "sensor_offset" | "load_step" | "periodic_disturbance"
         )
     });
-    if trend && averaged.weak.as_ref().is_some_and(|proof| proof.drifts()) {
+    if trend && equation.weak.as_ref().is_some_and(|proof| proof.drifts()) {
         return false;
     }
-    averaged.verdict != Verdict::Named
-        || free_run.verdict != Verdict::Unexplained
-            && free_run.free_run_error(data) < MUCH_BETTER * averaged.free_run_error(data)
+    if equation.verdict != Verdict::Named {
+        return true;
+    }
+    if free_run.verdict == Verdict::Unexplained {
+        return false;
+    }
+    match (
+        free_run.error_across_halves(fitted),
+        equation.error_across_halves(whole),
+    ) {
+        (Some(free), Some(averaged)) => free < MUCH_BETTER * averaged,
+        // What a half does not determine has nothing to say of the other.
+        (free, None) => free.is_some(),
+        (None, Some(_)) => false,
+    }
 }
 
 pub(crate) struct Answer<'a> {

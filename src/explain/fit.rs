@@ -5,6 +5,7 @@
 //! weights (Student's t), the noise model is estimated anew between rounds.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::data::{Data, Series};
 use super::noise::{MOST_ORDER, Mask, Noise};
@@ -297,45 +298,58 @@ impl Fit {
     /// Change of the simulation with each number: a series a number, and none for one that moves nothing.
     pub fn sensitivities(&mut self, problem: &Problem) -> Vec<Option<Series>> {
         let bounds = self.structure.bounds();
-        let mut columns = Vec::with_capacity(self.theta.len());
-        for i in 0..self.theta.len() {
-            let mut column = None;
-            for _ in 0..4 {
-                let mut moved = self.theta.clone();
-                // Forward, or backward from an upper bound.
-                let step = if moved[i] + self.steps[i] > bounds[i].1 {
-                    -self.steps[i]
-                } else {
-                    self.steps[i]
-                };
-                moved[i] += step;
-                let Some(simulated) = self.structure.simulate(&moved, problem.data) else {
-                    self.steps[i] = (self.steps[i] * 1e-2).max(SMALLEST_STEP);
-                    continue;
-                };
-                let size = problem.size(&simulated, &self.simulated);
-                if size == 0.0 {
-                    self.steps[i] = (self.steps[i] * 1e3).min(LARGEST_STEP);
-                    continue;
-                }
-                let far = !(STEP_SHARE / 30.0..=30.0 * STEP_SHARE).contains(&size);
-                self.steps[i] = (self.steps[i] * (STEP_SHARE / size).clamp(1e-4, 1e4))
-                    .clamp(SMALLEST_STEP, LARGEST_STEP);
-                if far {
-                    continue;
-                }
-                column = Some(
-                    simulated
-                        .iter()
-                        .zip(&self.simulated)
-                        .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b) / step).collect())
-                        .collect(),
-                );
-                break;
-            }
-            columns.push(column);
-        }
+        let mut steps = std::mem::take(&mut self.steps);
+        let columns = steps
+            .par_iter_mut()
+            .with_max_len(1)
+            .enumerate()
+            .map(|(i, step)| self.sensitivity(problem, i, bounds[i].1, step))
+            .collect();
+        self.steps = steps;
         columns
+    }
+
+    /// Change of the simulation with number `i`, whose difference step adapts; `None` where it moves nothing.
+    fn sensitivity(
+        &self,
+        problem: &Problem,
+        i: usize,
+        upper_bound: f64,
+        step: &mut f64,
+    ) -> Option<Series> {
+        for _ in 0..4 {
+            let mut moved = self.theta.clone();
+            // Forward, or backward from an upper bound.
+            let made = if moved[i] + *step > upper_bound {
+                -*step
+            } else {
+                *step
+            };
+            moved[i] += made;
+            let Some(simulated) = self.structure.simulate(&moved, problem.data) else {
+                *step = (*step * 1e-2).max(SMALLEST_STEP);
+                continue;
+            };
+            let size = problem.size(&simulated, &self.simulated);
+            if size == 0.0 {
+                *step = (*step * 1e3).min(LARGEST_STEP);
+                continue;
+            }
+            let far = !(STEP_SHARE / 30.0..=30.0 * STEP_SHARE).contains(&size);
+            *step =
+                (*step * (STEP_SHARE / size).clamp(1e-4, 1e4)).clamp(SMALLEST_STEP, LARGEST_STEP);
+            if far {
+                continue;
+            }
+            return Some(
+                simulated
+                    .iter()
+                    .zip(&self.simulated)
+                    .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b) / made).collect())
+                    .collect(),
+            );
+        }
+        None
     }
 
     /// Whitened derivatives of the values that count.

@@ -67,16 +67,18 @@ pub(crate) struct Finding {
 }
 
 impl Finding {
-    /// Root mean square error of the model that stands, over the standard deviations of the outputs in `data`.
-    pub fn free_run_error(&self, data: &Data) -> f64 {
-        let scale = data.output_scale();
-        let (mut sum, mut n) = (0.0, 0usize);
-        for (series, e) in self.model.residual.iter().enumerate() {
-            let scale = scale[series % scale.len()];
-            sum += e.iter().map(|e| (e / scale).powi(2)).sum::<f64>();
-            n += e.len();
-        }
-        (sum / n.max(1) as f64).sqrt()
+    /// Root mean square free-run error of each half of `data` when the numbers of the model that stands are fitted to the
+    /// other, over the standard deviation of what was recorded; `None` where a half does not determine them. Of drives: one
+    /// output.
+    pub fn error_across_halves(&self, data: &Data) -> Option<f64> {
+        let problem = Problem::new(data);
+        let error = match &self.weak {
+            Some(proof) => proof.error_across_halves(&problem),
+            None => super::prove::across_halves(&problem.mask, |own| {
+                Some(super::prove::refit(&problem, &self.model, own)?.residual)
+            }),
+        };
+        Some(error? / problem.scale[0])
     }
 }
 

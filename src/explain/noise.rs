@@ -35,7 +35,8 @@ impl Noise {
             scale: vec![1.0; outputs],
             degrees: f64::INFINITY,
         };
-        noise.fit_scale(residual, mask);
+        let squares = noise.squares(residual, mask);
+        noise.fit_scale(&squares);
         noise
     }
 
@@ -53,8 +54,9 @@ impl Noise {
             scale: vec![1.0; outputs],
             degrees: f64::INFINITY,
         };
-        noise.fit_scale(residual, mask);
-        noise.fit_degrees(residual, mask);
+        let squares = noise.squares(residual, mask);
+        noise.fit_scale(&squares);
+        noise.fit_degrees(&squares);
         noise
     }
 
@@ -77,15 +79,6 @@ impl Noise {
             .collect()
     }
 
-    /// `-2 log` of the density of one whitened, scaled value, up to the constant of the distribution.
-    pub fn cost(&self, e: f64) -> f64 {
-        if self.degrees.is_finite() {
-            (self.degrees + 1.0) * (e * e / self.degrees).ln_1p()
-        } else {
-            e * e
-        }
-    }
-
     /// Weight of one whitened value in a least-squares step.
     pub fn weight(&self, e: f64) -> f64 {
         if self.degrees.is_finite() {
@@ -97,18 +90,26 @@ impl Noise {
 
     /// `-2 log` likelihood of a residual.
     pub fn deviance(&self, residual: &Series, mask: &Mask) -> f64 {
-        let constant = self.constant();
         self.whiten(residual)
             .iter()
             .zip(mask)
             .enumerate()
             .map(|(s, (column, mask))| {
-                let log_scale = 2.0 * self.scale[s % self.scale.len()].ln();
-                kept(column, mask)
-                    .map(|e| self.cost(e) + log_scale + constant)
-                    .sum::<f64>()
+                let squares: Vec<f64> = kept(column, mask).map(|e| e * e).collect();
+                self.deviance_of(&squares, 1.0, self.scale[s % self.scale.len()])
             })
             .sum()
+    }
+
+    /// The same of an output's squared values, which are in units of `unit`, where the whitening filter divides by `scale`.
+    fn deviance_of(&self, squares: &[f64], unit: f64, scale: f64) -> f64 {
+        let cost = if self.degrees.is_finite() {
+            let share = 1.0 / (self.degrees * unit);
+            (self.degrees + 1.0) * sum_of_logarithms(squares, share)
+        } else {
+            squares.iter().sum::<f64>() / unit
+        };
+        cost + squares.len() as f64 * (2.0 * scale.ln() + self.constant())
     }
 
     /// `-2 log` of the normalising constant of the distribution.
@@ -123,29 +124,27 @@ impl Noise {
         }
     }
 
+    /// Squared values that the whitening filters make of a residual, not scaled: a list an output.
+    fn squares(&self, residual: &Series, mask: &Mask) -> Vec<Vec<f64>> {
+        let outputs = self.ar.len();
+        let mut squares = vec![Vec::new(); outputs];
+        for (s, (column, mask)) in residual.iter().zip(mask).enumerate() {
+            let whitened = filter(&self.ar[s % outputs], column, 1.0);
+            squares[s % outputs].extend(kept(&whitened, mask).map(|e| e * e));
+        }
+        squares
+    }
+
     /// Scales of largest likelihood for the present filters and degrees of freedom.
-    fn fit_scale(&mut self, residual: &Series, mask: &Mask) {
-        let outputs = self.scale.len();
-        self.scale = vec![1.0; outputs];
-        let whitened = self.whiten(residual);
-        for o in 0..outputs {
-            let values = || {
-                whitened
-                    .iter()
-                    .zip(mask)
-                    .skip(o)
-                    .step_by(outputs)
-                    .flat_map(|(column, mask)| kept(column, mask))
-            };
-            let n = values().count().max(1) as f64;
-            let mut square = values().map(|e| e * e).sum::<f64>() / n;
+    fn fit_scale(&mut self, squares: &[Vec<f64>]) {
+        for (scale, squares) in self.scale.iter_mut().zip(squares) {
+            let n = squares.len().max(1) as f64;
+            let mut square = squares.iter().sum::<f64>() / n;
             if self.degrees.is_finite() {
                 for _ in 0..30 {
                     let v = self.degrees;
-                    let next = values()
-                        .map(|e| (v + 1.0) * e * e / (v + e * e / square.max(1e-300)))
-                        .sum::<f64>()
-                        / n;
+                    let share = 1.0 / square.max(1e-300);
+                    let next = (v + 1.0) * sum(squares, |q| q / (v + q * share)) / n;
                     let done = (next / square - 1.0).abs() < 1e-6;
                     square = next;
                     if done {
@@ -153,39 +152,41 @@ impl Noise {
                     }
                 }
             }
-            self.scale[o] = square.sqrt().max(1e-150);
+            *scale = square.sqrt().max(1e-150);
         }
     }
 
-    fn fit_degrees(&mut self, residual: &Series, mask: &Mask) {
-        // Gaussian unless the fourth moment says otherwise: the t family is then searched.
-        let whitened = self.whiten(residual);
+    /// Gaussian unless the fourth moment says otherwise: the t family is then searched.
+    fn fit_degrees(&mut self, squares: &[Vec<f64>]) {
         let (mut n, mut m2, mut m4) = (0.0, 0.0, 0.0);
-        for (column, mask) in whitened.iter().zip(mask) {
-            for e in kept(column, mask) {
-                n += 1.0;
-                m2 += e * e;
-                m4 += e.powi(4);
-            }
+        for (squares, scale) in squares.iter().zip(&self.scale) {
+            let unit = scale * scale;
+            n += squares.len() as f64;
+            m2 += sum(squares, |q| q / unit);
+            m4 += sum(squares, |q| (q / unit) * (q / unit));
         }
         let kurtosis = if m2 > 0.0 { n * m4 / (m2 * m2) } else { 3.0 };
         // Standard error of the kurtosis of n Gaussian values: sqrt(24/n).
         if kurtosis < 3.0 + 4.0 * (24.0_f64 / f64::max(n, 1.0)).sqrt() {
             return;
         }
-        let mut best = self.clone();
         let mut least = f64::INFINITY;
         for degrees in DEGREES {
-            let mut trial = self.clone();
-            trial.degrees = degrees;
-            trial.fit_scale(residual, mask);
-            let deviance = trial.deviance(residual, mask);
+            let mut trial = Self {
+                degrees,
+                ..self.clone()
+            };
+            trial.fit_scale(squares);
+            let deviance = squares
+                .iter()
+                .zip(&trial.scale)
+                .map(|(squares, scale)| trial.deviance_of(squares, scale * scale, *scale))
+                .sum();
             if deviance < least {
                 least = deviance;
-                best = trial;
+                *self = trial;
             }
         }
-        *self = best;
     }
 }
 
@@ -194,6 +195,35 @@ fn kept<'a>(column: &'a [f64], mask: &'a [bool]) -> impl Iterator<Item = f64> + 
         .iter()
         .zip(mask)
         .filter_map(|(e, keep)| keep.then_some(*e))
+}
+
+/// `sum of(value)`, in as many partial sums as are made at once.
+fn sum(values: &[f64], of: impl Fn(f64) -> f64) -> f64 {
+    let chunks = values.chunks_exact(TOGETHER);
+    let rest: f64 = chunks.remainder().iter().map(|v| of(*v)).sum();
+    let mut sums = [0.0; TOGETHER];
+    for chunk in chunks {
+        for (sum, value) in sums.iter_mut().zip(chunk) {
+            *sum += of(*value);
+        }
+    }
+    rest + sums.iter().sum::<f64>()
+}
+
+/// `sum ln(1 + share value)`: the logarithm of products as long as they are numbers, which is one where there were hundreds.
+fn sum_of_logarithms(values: &[f64], share: f64) -> f64 {
+    const LARGE: f64 = 1e150;
+    let (mut sum, mut product) = (0.0, 1.0);
+    for value in values {
+        let factor = 1.0 + share * value;
+        if product * factor > LARGE {
+            sum += f64::ln(product);
+            product = factor;
+        } else {
+            product *= factor;
+        }
+    }
+    sum + product.ln()
 }
 
 /// `gain * (v[k] + ar[0] v[k-1] + ...)`, from rest.
@@ -296,4 +326,111 @@ fn autoregression(columns: &[(&Vec<f64>, &Vec<bool>)], most_order: usize) -> Vec
         }
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StudentT};
+
+    #[test]
+    fn products_have_the_logarithm_of_the_sum() {
+        let values: Vec<f64> = (0..2000)
+            .map(|k| f64::from(k % 97).powi(3) * 1e-9 * f64::from(k))
+            .chain([1e-30, 1e200, 1e290, 1e160, 0.0])
+            .collect();
+        for share in [1e-12, 0.3, 1e5] {
+            let expected: f64 = values.iter().map(|v| (share * v).ln_1p()).sum();
+            let found = sum_of_logarithms(&values, share);
+            assert!((found / expected - 1.0).abs() < 1e-11, "{found} {expected}");
+        }
+        assert!(sum_of_logarithms(&[1.0, f64::NAN, 2.0], 1.0).is_nan());
+        assert_eq!(sum(&values[..19], |v| v), values[..19].iter().sum::<f64>());
+    }
+
+    /// An autoregression driven by Student's t with three degrees of freedom, in two outputs of other size.
+    fn heavy(samples: usize) -> (Series, Mask) {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let tails = StudentT::new(3.0).unwrap();
+        let series: Series = [0.1, 20.0]
+            .map(|size| {
+                let mut state = 0.0;
+                (0..samples)
+                    .map(|_| {
+                        state = 0.8 * state + size * tails.sample(&mut random);
+                        state
+                    })
+                    .collect()
+            })
+            .to_vec();
+        let mask = vec![vec![true; samples]; 2];
+        (series, mask)
+    }
+
+    #[test]
+    fn colour_tails_and_sizes_are_found() {
+        let (residual, mask) = heavy(4000);
+        let noise = Noise::estimate(&residual, 2, &mask, MOST_ORDER);
+        for (ar, (scale, truth)) in noise.ar.iter().zip(noise.scale.iter().zip([0.1, 20.0])) {
+            assert!((ar[0] + 0.8).abs() < 0.05, "{ar:?}");
+            assert!((scale / truth - 1.0).abs() < 0.1, "{scale}");
+        }
+        assert!(noise.degrees <= 4.0, "{}", noise.degrees);
+        // Its likelihood, by the density of Student's t.
+        let v = noise.degrees;
+        let whitened = noise.whiten(&residual);
+        let constant =
+            ln_gamma(0.5 * (v + 1.0)) - ln_gamma(0.5 * v) - 0.5 * (v * std::f64::consts::PI).ln();
+        let literal: f64 = whitened
+            .iter()
+            .zip(&noise.scale)
+            .flat_map(|(e, scale)| e.iter().map(move |e| (*e, *scale)))
+            .map(|(e, scale)| {
+                -2.0 * (constant - scale.ln() - 0.5 * (v + 1.0) * (e * e / v).ln_1p())
+            })
+            .sum();
+        let deviance = noise.deviance(&residual, &mask);
+        assert!((deviance / literal - 1.0).abs() < 1e-10);
+        // No other scale is likelier, nor a Gaussian.
+        for factor in [0.97, 1.03] {
+            let mut other = noise.clone();
+            other.scale[0] *= factor;
+            assert!(other.deviance(&residual, &mask) > deviance);
+        }
+        let mut normal = noise.clone();
+        normal.degrees = f64::INFINITY;
+        assert!(normal.deviance(&residual, &mask) > deviance + 100.0);
+    }
+
+    #[test]
+    fn what_the_mask_leaves_out_does_not_count() {
+        let (mut residual, mut mask) = heavy(1000);
+        for (column, mask) in residual.iter_mut().zip(&mut mask) {
+            for k in 400..500 {
+                column[k] = 1e6;
+            }
+            // The filters reach across the gap's end.
+            for k in 400..500 + MOST_ORDER {
+                mask[k] = false;
+            }
+        }
+        let noise = Noise::estimate(&residual, 2, &mask, MOST_ORDER);
+        assert!(noise.scale[0] < 0.3 && noise.scale[1] < 60.0, "{noise:?}");
+    }
+
+    #[test]
+    fn white_noise_stays_white_and_gaussian() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+        let normal = rand_distr::StandardNormal;
+        let series: Series = vec![(0..3000).map(|_| normal.sample(&mut random)).collect()];
+        let mask = vec![vec![true; 3000]];
+        let noise = Noise::estimate(&series, 1, &mask, MOST_ORDER);
+        assert_eq!((noise.ar[0].len(), noise.degrees), (0, f64::INFINITY));
+        assert!((noise.scale[0] - 1.0).abs() < 0.05);
+        assert_eq!(noise.len(), 1);
+        let squares: f64 = noise.whiten(&series)[0].iter().map(|e| e * e).sum();
+        let literal = squares + 3000.0 * (2.0 * noise.scale[0].ln() + std::f64::consts::TAU.ln());
+        assert!((noise.deviance(&series, &mask) - literal).abs() < 1e-8);
+    }
 }

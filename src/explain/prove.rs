@@ -57,6 +57,35 @@ pub(crate) fn refit(problem: &Problem, fit: &Fit, train: &Mask) -> Option<Fit> {
     fit.improved(&without, Effort::RANK)
 }
 
+/// Root mean square of what each half of the recordings leaves in the other: `residual` fits the samples of a mask.
+pub(crate) fn across_halves(
+    mask: &Mask,
+    residual: impl Fn(&Mask) -> Option<Series> + Sync,
+) -> Option<f64> {
+    let half = |first: bool| -> Mask {
+        mask.iter()
+            .map(|m| {
+                m.iter()
+                    .enumerate()
+                    .map(|(k, keep)| *keep && (k < m.len() / 2) == first)
+                    .collect()
+            })
+            .collect()
+    };
+    let halves = [half(true), half(false)];
+    let (first, second) = rayon::join(|| residual(&halves[0]), || residual(&halves[1]));
+    let (mut sum, mut n) = (0.0, 0usize);
+    for (residual, other) in [(first?, &halves[1]), (second?, &halves[0])] {
+        for (e, keep) in residual.iter().zip(other) {
+            for (e, _) in e.iter().zip(keep).filter(|(_, keep)| **keep) {
+                sum += e * e;
+                n += 1;
+            }
+        }
+    }
+    Some((sum / n.max(1) as f64).sqrt())
+}
+
 /// An error so many times the output's variation is as bad as any; an output that stands still has none.
 const MOST_LOST: f64 = 1e6;
 

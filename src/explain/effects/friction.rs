@@ -1,6 +1,8 @@
 //! Forces that dissipate: dry friction with and without a breakaway force, drag.
 
-use super::{Action, Definition, Mimic, Motion, Needs, Observed, Parameter, Sense, Unit, level};
+use super::{
+    Action, Definition, Mimic, Motion, Needs, Observed, Parameter, Sense, Unit, decay, level,
+};
 
 const NO_BREAKAWAY: Mimic = Mimic {
     effect: "coulomb_friction",
@@ -220,19 +222,13 @@ fn damped_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 3]) -> f64 {
 /// [`bristle`] whose strength falls with the speed.
 fn breakaway_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 3]) -> f64 {
     let slow = motion.middle_rate() / p[2];
-    bristle_force(1.0 + p[1] * (-slow * slow).exp(), p[0], 0.0, motion, memory)
+    bristle_force(1.0 + p[1] * decay(slow * slow), p[0], 0.0, motion, memory)
 }
 
 /// LuGre friction.
 fn damped_breakaway_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 3]) -> f64 {
     let slow = motion.middle_rate() / p[3];
-    bristle_force(
-        1.0 + p[2] * (-slow * slow).exp(),
-        p[0],
-        p[1],
-        motion,
-        memory,
-    )
+    bristle_force(1.0 + p[2] * decay(slow * slow), p[0], p[1], motion, memory)
 }
 
 /// Mean force over the interval of bristles that yield over `distance` and are damped over `time`.
@@ -261,7 +257,7 @@ fn bristle_force(
     for _ in 0..4 {
         let moved = free - gain * f - from;
         let side = moved.signum();
-        z = side - (side - before) * (-moved.abs() / distance).exp();
+        z = side - (side - before) * decay(moved.abs() / distance);
         let excess = z + damping * (z - before) - f;
         let slope = 1.0 + gain * (1.0 + damping) * (1.0 - side * z) / distance;
         let step = excess / slope;
@@ -276,7 +272,7 @@ fn bristle_force(
 
 fn stribeck(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     let slow = motion.middle_rate() / p[1];
-    motion.stopping_force(1.0 + p[0] * (-slow * slow).exp())
+    motion.stopping_force(1.0 + p[0] * decay(slow * slow))
 }
 
 fn one_way_drag(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {

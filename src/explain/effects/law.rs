@@ -95,3 +95,10 @@ pub(crate) fn level(values: &[f64], q: f64, of: fn(f64) -> f64) -> f64 {
     sample.sort_by(f64::total_cmp);
     sample[((sample.len() - 1) as f64 * q).round() as usize]
 }
+
+/// `exp(-x)` for positive `x`, zero where that is next to no number: the mathematics library takes many times as long to say
+/// so.
+pub(crate) fn decay(x: f64) -> f64 {
+    const NOTHING_LEFT: f64 = 700.0;
+    if x > NOTHING_LEFT { 0.0 } else { (-x).exp() }
+}

@@ -14,7 +14,7 @@ mod process;
 mod sensor;
 mod stiffness;
 
-pub(crate) use law::{Clock, Motion, Observed, level};
+pub(crate) use law::{Clock, Motion, Observed, decay, level};
 
 /// Where an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

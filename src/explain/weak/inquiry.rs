@@ -63,6 +63,13 @@ pub(crate) struct Proof {
 }
 
 impl Proof {
+    /// Root mean square free-run error of each half of the recordings when the other half is fitted; `None` where a half
+    /// does not determine the coefficients.
+    pub fn error_across_halves(&self, problem: &Problem) -> Option<f64> {
+        let windows = Windows::choose(problem.data, self.equation.reading)?;
+        error_across_halves(&self.equation, &windows, problem.data, problem)
+    }
+
     /// Whether any error of a free run adds up: the position of a mass is measured.
     pub fn drifts(&self) -> bool {
         self.equation.reading == Reading::Position
@@ -324,6 +331,10 @@ fn decide(chosen: &Ranking, data: &Data, problem: &Problem) -> Option<Decided> {
         )
     });
     let suffices = left.as_ref().is_none_or(holds);
+    let pays = |pair: &Equation, single: &Equation| {
+        let error = |equation: &Equation| error_across_halves(equation, windows, data, problem);
+        matches!((error(pair), error(single)), (Some(a), Some(b)) if a * a <= PAYS * b * b)
+    };
     let mut resembles = None;
     if let (Some(single), Some(pair)) = (best_of(&seconds, 1), best_of(&seconds, 2)) {
         let more = single.criterion - pair.criterion;
@@ -333,7 +344,7 @@ fn decide(chosen: &Ranking, data: &Data, problem: &Problem) -> Option<Decided> {
         if !suffices
             && more > required(gain)
             && foretells(pair, first)
-            && runs_better(&pair.equation, &first.equation, windows, data, problem)
+            && pays(&pair.equation, &first.equation)
         {
             return Some(Decided {
                 equation: pair.equation.clone(),
@@ -355,33 +366,17 @@ fn a_mass(candidate: &Candidate) -> bool {
     candidate.regression.coefficients[0].abs() > A_MASS * std
 }
 
-/// Whether `a`, fitted to one half of the recording, runs freely through the other better than `b` does.
-fn runs_better(
-    a: &Equation,
-    b: &Equation,
+/// Root mean square free-run error of each half of the recordings when `equation` is fitted to the other.
+fn error_across_halves(
+    equation: &Equation,
     windows: &Windows,
     data: &Data,
     problem: &Problem,
-) -> bool {
-    let total = |equation: &Equation| -> Option<f64> {
-        let mut sum = 0.0;
-        for first_half in [true, false] {
-            let own: Mask = problem
-                .mask
-                .iter()
-                .map(|m| {
-                    (0..m.len())
-                        .map(|k| (k < m.len() / 2) == first_half)
-                        .collect()
-                })
-                .collect();
-            let other: Mask = own.iter().map(|m| m.iter().map(|k| !k).collect()).collect();
-            let (fit, _) = tethered(equation, &inside(windows, &own), data, &own)?;
-            sum += error_over(&as_fit(problem, equation, &fit)?, &other).powi(2);
-        }
-        Some(sum)
-    };
-    matches!((total(a), total(b)), (Some(a), Some(b)) if a <= PAYS * b)
+) -> Option<f64> {
+    prove::across_halves(&problem.mask, |own| {
+        let (fit, _) = tethered(equation, &inside(windows, own), data, own)?;
+        Some(as_fit(problem, equation, &fit)?.residual)
+    })
 }
 
 fn finding(

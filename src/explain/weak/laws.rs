@@ -1,7 +1,7 @@
 //! The laws that an averaged equation of motion is asked about: each is linear in its coefficients, given one number
 //! of shape at most.
 
-use super::super::effects::{self, Definition};
+use super::super::effects::{self, Definition, decay};
 use super::windows::{Reading, Windows, quantile};
 
 /// Cogging pitches that are tried over the range of motion.
@@ -135,7 +135,7 @@ impl Form {
             Kind::Coulomb => vec![w.average(|s, k| side(v(s, k)))],
             Kind::Stribeck => vec![
                 w.average(|s, k| side(v(s, k))),
-                w.average(|s, k| side(v(s, k)) * (-(v(s, k) / shape).powi(2)).exp()),
+                w.average(|s, k| side(v(s, k)) * decay((v(s, k) / shape).powi(2))),
             ],
             Kind::Drag => vec![w.average(|s, k| v(s, k) * v(s, k).abs())],
             Kind::Directional => vec![w.average(|s, k| v(s, k).abs())],

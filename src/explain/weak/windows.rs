@@ -292,17 +292,23 @@ impl Windows {
         Some(windows)
     }
 
-    /// A quantity given at each sample, averaged over the windows.
+    /// A quantity given at each sample, averaged over the windows. Neighbours overlap: what they share is asked for once.
     pub fn average(&self, of: impl Fn(usize, usize) -> f64) -> Vec<f64> {
+        let mut held: Vec<f64> = Vec::with_capacity(self.bump.len());
+        let mut held_from = (usize::MAX, 0);
         self.places
             .iter()
             .map(|&(s, middle)| {
                 let from = middle - self.half;
-                self.bump
-                    .iter()
-                    .enumerate()
-                    .map(|(i, w)| w * of(s, from + i))
-                    .sum()
+                let (segment, first) = held_from;
+                if s == segment && (first..first + held.len()).contains(&from) {
+                    held.drain(..from - first);
+                } else {
+                    held.clear();
+                }
+                held.extend((from + held.len()..from + self.bump.len()).map(|k| of(s, k)));
+                held_from = (s, from);
+                self.bump.iter().zip(&held).map(|(w, v)| w * v).sum()
             })
             .collect()
     }
