@@ -18,6 +18,7 @@ use std::time::Instant;
 use concealed::{Drawing, Effect, Kind, draw};
 use innovant::explain::{Explanation, Options, Verdict, explain};
 use innovant::report::to_json;
+use rayon::prelude::*;
 use study::answer::Outcome;
 use study::plan::Plan;
 use study::question::Question;
@@ -129,16 +130,19 @@ fn answers_do_not_depend_on_units_or_the_clock() {
         Effect::LoadStep,
         Effect::PeriodicDisturbance,
     ];
-    let mut changed = Vec::new();
-    for (index, effect) in effects.into_iter().enumerate() {
+    let ask_again = |(index, effect): (usize, Effect)| {
+        let mut changed = Vec::new();
         let case = draw(11, index, &drawing(Kind::Effect(effect)));
         let question = Question::of(&case);
         let said = ask(&question);
         const LATER: f64 = 7200.0;
         for (what, question, moved) in [
-            ("outputs times 1000", question.in_units(1.0, 1e3), 0.0),
+            (
+                "outputs times 1000, later",
+                question.in_units(1.0, 1e3).starting_at(LATER),
+                LATER,
+            ),
             ("all times 1000", question.in_units(1e3, 1e3), 0.0),
-            ("later", question.starting_at(LATER), LATER),
         ] {
             let again = ask(&question);
             let same_window = again
@@ -159,7 +163,14 @@ fn answers_do_not_depend_on_units_or_the_clock() {
                 ));
             }
         }
-    }
+        changed
+    };
+    let changed: Vec<String> = effects
+        .into_par_iter()
+        .enumerate()
+        .with_max_len(1)
+        .flat_map_iter(ask_again)
+        .collect();
     assert!(changed.is_empty(), "{}", changed.join("\n"));
 }
 

@@ -10,6 +10,7 @@ use cli_support::Folder;
 use innovant::limits::parse_size;
 use innovant::log::{Channel, Log};
 use innovant::systems;
+use rayon::prelude::*;
 
 /// A refusal is a matter of reading the header; this allows for a machine that is busy.
 const AT_ONCE: Duration = Duration::from_secs(5);
@@ -227,7 +228,7 @@ fn estimate(folder: &Folder, arguments: &[&str]) -> f64 {
 /// The estimates are within a factor of two of what requests take.
 #[cfg(target_os = "linux")]
 #[test]
-fn estimates_are_near_the_peaks() {
+fn estimates_of_identification_are_near_the_peaks() {
     let folder = Folder::new();
     for (inputs, outputs) in [(1, 1), (2, 2), (4, 4), (1, 8)] {
         let name = format!("{inputs}_{outputs}.csv");
@@ -262,7 +263,7 @@ fn estimates_are_near_the_peaks() {
             "robust",
         ],
     ];
-    for arguments in requests {
+    requests.into_par_iter().for_each(|arguments| {
         let (estimate, peak) = (estimate(&folder, arguments), peak(&folder, arguments));
         println!(
             "{:>7.1} MB of {:>7.1} MB: {}",
@@ -274,7 +275,13 @@ fn estimates_are_near_the_peaks() {
             (0.5..2.0).contains(&(estimate / peak)),
             "{arguments:?}: {estimate:e} bytes estimated, {peak:e} taken"
         );
-    }
+    });
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn estimates_of_explanations_are_near_the_peaks() {
+    let folder = Folder::new();
     for (case, simulated, outputs) in [
         ("case_006", "simulation.csv", 1),
         ("case_004", "simulation.json", 2),

@@ -94,7 +94,8 @@ fn sum(mut a: Outcome, b: Outcome) -> Outcome {
 /// count as independent as two by two channels have.
 const INDEPENDENT_PER_RUN: f64 = 4.0;
 
-fn check(kind: &Kind, index: usize, runs: u64) -> Vec<String> {
+/// The line of the table, and what is wrong with it.
+fn check(kind: &Kind, index: usize, runs: u64) -> (String, Vec<String>) {
     let found = (0..runs)
         .into_par_iter()
         .map(|run| identified(kind, 1000 * (1 + index as u64) + run))
@@ -110,7 +111,7 @@ fn check(kind: &Kind, index: usize, runs: u64) -> Vec<String> {
             format!("{:5.1}", count.shares().0)
         }
     };
-    println!(
+    let line = format!(
         "{:<34} {:>4} runs, {:>4} errors, {:>4} trusted; inside 95 %, trusted: G {} |G| {} poles {}; all: G {} |G| {}; \
          trusted and wrong {:.1} / {:.1} %",
         kind.name,
@@ -142,7 +143,7 @@ fn check(kind: &Kind, index: usize, runs: u64) -> Vec<String> {
     if kind.must == Must::Trust && trusted < 0.8 || kind.must == Must::Doubt && trusted > 0.0 {
         wrong.push(format!("{}: {:.0} % trusted", kind.name, 100.0 * trusted));
     }
-    wrong
+    (line, wrong)
 }
 
 #[test]
@@ -150,12 +151,16 @@ fn an_answer_is_right_or_it_says_that_it_is_not() {
     let asked = std::env::var("INNOVANT_LIE_RUNS").ok();
     let asked: Option<u64> = asked.and_then(|v| v.parse().ok());
     let only = std::env::var("INNOVANT_LIE_ONLY").unwrap_or_default();
-    let wrong: Vec<String> = kinds()
-        .iter()
+    let answers: Vec<(String, Vec<String>)> = kinds()
+        .par_iter()
         .enumerate()
         .filter(|(_, kind)| kind.name.contains(&only))
-        .flat_map(|(index, kind)| check(kind, index, asked.unwrap_or(kind.runs)))
+        .map(|(index, kind)| check(kind, index, asked.unwrap_or(kind.runs)))
         .collect();
+    for (line, _) in &answers {
+        println!("{line}");
+    }
+    let wrong: Vec<String> = answers.into_iter().flat_map(|(_, wrong)| wrong).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 

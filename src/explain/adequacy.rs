@@ -9,7 +9,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::data::Series;
+use super::data::{Series, difference};
 use super::fit::{Fit, Problem};
 use super::noise::{Mask, Noise};
 use super::screen::Bench;
@@ -103,7 +103,7 @@ pub(crate) fn adequacy(
     let bench = Bench::new(problem, &fit, &noise, sensitivities)?;
     let mut tests = Vec::new();
     let mut features = 0;
-    let moved = problem.size(&given.simulated, &fit.simulated) > OTHER_MOTION;
+    let moved = problem.size(&difference(&given.simulated, &fit.simulated)) > OTHER_MOTION;
     for moving in [Some(&fit), moved.then_some(given)].into_iter().flatten() {
         let Some((gained, left, count)) = bench.feature_gain(moving) else {
             continue;

@@ -34,6 +34,14 @@ pub(crate) struct Data {
 /// A column a segment and output (`segment * outputs + output`): residuals, simulated outputs, weights.
 pub(crate) type Series = Vec<Vec<f64>>;
 
+/// `a - b`.
+pub(crate) fn difference(a: &Series, b: &Series) -> Series {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect())
+        .collect()
+}
+
 impl Data {
     /// Samples over all segments (a sample holds all channels).
     pub fn samples(&self) -> usize {

@@ -7,8 +7,8 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::data::{Data, Series};
-use super::noise::{MOST_ORDER, Mask, Noise};
+use super::data::{Data, Series, difference};
+use super::noise::{MOST_ORDER, Mask, Noise, extend_with_kept, kept, sum_of_squares};
 use super::structure::Structure;
 use crate::linalg::multiply_tn;
 
@@ -91,14 +91,11 @@ impl<'a> Problem<'a> {
     }
 
     /// Root mean square of a simulated change, in standard deviations of the outputs.
-    pub fn size(&self, a: &Series, b: &Series) -> f64 {
+    pub fn size(&self, change: &Series) -> f64 {
         let (mut sum, mut n) = (0.0, 0usize);
-        for (s, (a, b)) in a.iter().zip(b).enumerate() {
-            let scale = self.scale[s % self.scale.len()];
-            for (a, b) in a.iter().zip(b) {
-                sum += ((a - b) / scale).powi(2);
-            }
-            n += a.len();
+        for (s, change) in change.iter().enumerate() {
+            sum += sum_of_squares(change) / self.scale[s % self.scale.len()].powi(2);
+            n += change.len();
         }
         (sum / n.max(1) as f64).sqrt()
     }
@@ -330,7 +327,8 @@ impl Fit {
                 *step = (*step * 1e-2).max(SMALLEST_STEP);
                 continue;
             };
-            let size = problem.size(&simulated, &self.simulated);
+            let mut change = difference(&simulated, &self.simulated);
+            let size = problem.size(&change);
             if size == 0.0 {
                 *step = (*step * 1e3).min(LARGEST_STEP);
                 continue;
@@ -341,13 +339,10 @@ impl Fit {
             if far {
                 continue;
             }
-            return Some(
-                simulated
-                    .iter()
-                    .zip(&self.simulated)
-                    .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b) / made).collect())
-                    .collect(),
-            );
+            for value in change.iter_mut().flatten() {
+                *value /= made;
+            }
+            return Some(change);
         }
         None
     }
@@ -365,12 +360,7 @@ impl Fit {
         let mut flat = Vec::with_capacity(rows * used.len());
         for column in columns.iter().flatten() {
             for (series, mask) in noise.whiten(column).iter().zip(&problem.mask) {
-                flat.extend(
-                    series
-                        .iter()
-                        .zip(mask)
-                        .filter_map(|(v, keep)| keep.then_some(*v)),
-                );
+                extend_with_kept(&mut flat, series, mask);
             }
         }
         flat.iter().all(|v| v.is_finite()).then(|| Jacobian {
@@ -449,21 +439,8 @@ impl Jacobian {
         before: &Series,
         after: &Series,
     ) {
-        let change: Series = after
-            .iter()
-            .zip(before)
-            .map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect())
-            .collect();
-        let missed: Vec<f64> = noise
-            .whiten(&change)
-            .iter()
-            .zip(&problem.mask)
-            .flat_map(|(v, mask)| {
-                v.iter()
-                    .zip(mask)
-                    .filter_map(|(v, keep)| keep.then_some(*v))
-            })
-            .collect();
+        let change = difference(after, before);
+        let missed = kept(&noise.whiten(&change), &problem.mask);
         let step = DVector::from_iterator(self.used.len(), self.used.iter().map(|i| step[*i]));
         let missed = DVector::from_vec(missed) - &self.columns * &step;
         let along: Vec<f64> = self
@@ -489,16 +466,8 @@ impl Jacobian {
         only: Option<&[bool]>,
     ) -> NormalEquations {
         let rows = self.columns.nrows();
-        let mut weights = Vec::with_capacity(rows);
-        let mut e = Vec::with_capacity(rows);
-        for (column, mask) in noise.whiten(residual).iter().zip(&problem.mask) {
-            for (v, keep) in column.iter().zip(mask) {
-                if *keep {
-                    weights.push(noise.weight(*v));
-                    e.push(*v);
-                }
-            }
-        }
+        let e = kept(&noise.whiten(residual), &problem.mask);
+        let mut weights: Vec<f64> = e.iter().map(|e| noise.weight(*e)).collect();
         for (weight, pass) in weights.iter_mut().zip(only.unwrap_or_default()) {
             if !pass {
                 *weight = 0.0;

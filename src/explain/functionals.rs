@@ -1,5 +1,7 @@
 //! What can be read off a state: positions, rates, and integrals of outputs.
 
+use std::sync::OnceLock;
+
 use super::coordinates::Derivatives;
 use super::plant::Plant;
 use super::structure::Signal;
@@ -16,31 +18,44 @@ pub(crate) struct SignalRows {
 #[derive(Debug, Clone)]
 pub(crate) struct Functionals {
     derivatives: Derivatives,
+    /// Which outputs [`Functionals::integrates`] is true of: asked for every place of every effect.
+    integrating: OnceLock<Vec<bool>>,
 }
 
 impl Functionals {
     pub fn new(plant: &Plant) -> Self {
         Self {
             derivatives: Derivatives::new(plant),
+            integrating: OnceLock::new(),
         }
     }
 
-    /// Whether the output's integral can be read off the state: it must be a derivative, with no static gain.
+    /// Whether the output's integral can be read off the state of `plant`, whose rows these are: it must be a derivative, with
+    /// no static gain.
     pub fn integrates(&self, plant: &Plant, output: usize) -> bool {
+        self.integrating.get_or_init(|| self.integrating(plant))[output]
+    }
+
+    fn integrating(&self, plant: &Plant) -> Vec<bool> {
+        let none = || vec![false; plant.outputs];
         let Some(integral) = &self.derivatives.integral else {
-            return false;
+            return none();
         };
         // d/dt (C A_c^-1 x) = C x + C A_c^-1 B_c u: the second term is minus the static gain.
         let n = plant.states;
         let identity = nalgebra::DMatrix::identity(n, n);
         let Some(inverse) = (identity - plant.a_matrix()).try_inverse() else {
-            return false;
+            return none();
         };
         let static_gain = plant.c_matrix() * inverse * plant.b_matrix();
-        let row_norm: f64 = integral[output].iter().map(|v| v * v).sum::<f64>().sqrt();
-        let peak = impulse_size(plant, output);
-        row_norm.is_finite()
-            && (0..plant.inputs).all(|j| static_gain[(output, j)].abs() < 0.02 * peak)
+        (0..plant.outputs)
+            .map(|output| {
+                let row_norm: f64 = integral[output].iter().map(|v| v * v).sum::<f64>().sqrt();
+                let peak = impulse_size(plant, output);
+                row_norm.is_finite()
+                    && (0..plant.inputs).all(|j| static_gain[(output, j)].abs() < 0.02 * peak)
+            })
+            .collect()
     }
 
     /// Whether a position can be what `signal` says: an output without static gain is a speed, and positions are its

@@ -1,7 +1,7 @@
 //! Decides: consistent, parameters, named, family or unexplained.
 
 use super::adequacy::{Adequacy, adequacy};
-use super::data::Data;
+use super::data::{Data, difference};
 use super::effects::{self, Definition, Unit};
 use super::exact::{Freeze, frozen};
 use super::explanation::Verdict;
@@ -339,7 +339,7 @@ fn detectable(
         let Some(simulated) = without.simulate(&theta, problem.data) else {
             continue;
         };
-        let change = problem.size(&simulated, &r.fit.simulated);
+        let change = problem.size(&difference(&simulated, &r.fit.simulated));
         let lost = r
             .fit
             .noise

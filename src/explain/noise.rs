@@ -95,7 +95,11 @@ impl Noise {
             .zip(mask)
             .enumerate()
             .map(|(s, (column, mask))| {
-                let squares: Vec<f64> = kept(column, mask).map(|e| e * e).collect();
+                let mut squares = Vec::with_capacity(column.len());
+                extend_with_kept(&mut squares, column, mask);
+                for value in &mut squares {
+                    *value *= *value;
+                }
                 self.deviance_of(&squares, 1.0, self.scale[s % self.scale.len()])
             })
             .sum()
@@ -130,7 +134,10 @@ impl Noise {
         let mut squares = vec![Vec::new(); outputs];
         for (s, (column, mask)) in residual.iter().zip(mask).enumerate() {
             let whitened = filter(&self.ar[s % outputs], column, 1.0);
-            squares[s % outputs].extend(kept(&whitened, mask).map(|e| e * e));
+            extend_with_kept(&mut squares[s % outputs], &whitened, mask);
+        }
+        for value in squares.iter_mut().flatten() {
+            *value *= *value;
         }
         squares
     }
@@ -190,11 +197,28 @@ impl Noise {
     }
 }
 
-fn kept<'a>(column: &'a [f64], mask: &'a [bool]) -> impl Iterator<Item = f64> + 'a {
-    column
-        .iter()
-        .zip(mask)
-        .filter_map(|(e, keep)| keep.then_some(*e))
+/// Appends the values that count to `out`.
+pub(crate) fn extend_with_kept(out: &mut Vec<f64>, column: &[f64], mask: &[bool]) {
+    let mut from = 0;
+    // Nearly all count: stretches are copied whole.
+    while let Some(skip) = mask[from..].iter().position(|keep| *keep) {
+        from += skip;
+        let length = mask[from..]
+            .iter()
+            .position(|keep| !keep)
+            .unwrap_or(mask.len() - from);
+        out.extend_from_slice(&column[from..from + length]);
+        from += length;
+    }
+}
+
+/// The values of all series that count, one after the other.
+pub(crate) fn kept(series: &Series, mask: &Mask) -> Vec<f64> {
+    let mut out = Vec::with_capacity(mask.iter().map(Vec::len).sum());
+    for (column, mask) in series.iter().zip(mask) {
+        extend_with_kept(&mut out, column, mask);
+    }
+    out
 }
 
 /// `sum of(value)`, in as many partial sums as are made at once.
@@ -205,6 +229,26 @@ fn sum(values: &[f64], of: impl Fn(f64) -> f64) -> f64 {
     for chunk in chunks {
         for (sum, value) in sums.iter_mut().zip(chunk) {
             *sum += of(*value);
+        }
+    }
+    rest + sums.iter().sum::<f64>()
+}
+
+/// `sum v^2`.
+pub(crate) fn sum_of_squares(values: &[f64]) -> f64 {
+    product(values, values)
+}
+
+/// `sum a b` over as many as the shorter has, in as many partial sums as are made at once.
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len().min(b.len());
+    let (a, b) = (a[..n].chunks_exact(TOGETHER), b[..n].chunks_exact(TOGETHER));
+    let last = a.remainder().iter().zip(b.remainder());
+    let rest: f64 = last.map(|(a, b)| a * b).sum();
+    let mut sums = [0.0; TOGETHER];
+    for (a, b) in a.zip(b) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
         }
     }
     rest + sums.iter().sum::<f64>()
@@ -279,22 +323,22 @@ fn filter_of_order<const P: usize>(ar: &[f64], v: &[f64], gain: f64) -> Vec<f64>
 /// Autoregression by Levinson and Durbin on the biased autocovariance (always stable), order by Schwarz.
 fn autoregression(columns: &[(&Vec<f64>, &Vec<bool>)], most_order: usize) -> Vec<f64> {
     // About the mean: a constant is an offset to be explained, not colour with a pole at one.
-    let (mut n, mut total) = (0usize, 0.0);
+    let mut values = Vec::new();
     for (v, mask) in columns {
-        for value in kept(v, mask) {
-            n += 1;
-            total += value;
-        }
+        extend_with_kept(&mut values, v, mask);
     }
-    let mean = total / n.max(1) as f64;
+    let n = values.len();
+    let mean = values.iter().sum::<f64>() / n.max(1) as f64;
     let mut covariance = vec![0.0; most_order + 1];
     for (v, mask) in columns {
-        for (lag, sum) in covariance.iter_mut().enumerate() {
-            for k in lag..v.len() {
-                if mask[k] && mask[k - lag] {
-                    *sum += (v[k] - mean) * (v[k - lag] - mean);
-                }
-            }
+        // What does not count adds nothing.
+        let centred: Vec<f64> = v
+            .iter()
+            .zip(mask.iter())
+            .map(|(v, keep)| if *keep { v - mean } else { 0.0 })
+            .collect();
+        for (lag, total) in covariance.iter_mut().enumerate() {
+            *total += product(centred.get(lag..).unwrap_or_default(), &centred);
         }
     }
     if n < 4 * most_order + 16 || covariance[0] <= 0.0 {
@@ -346,7 +390,10 @@ mod tests {
             assert!((found / expected - 1.0).abs() < 1e-11, "{found} {expected}");
         }
         assert!(sum_of_logarithms(&[1.0, f64::NAN, 2.0], 1.0).is_nan());
-        assert_eq!(sum(&values[..19], |v| v), values[..19].iter().sum::<f64>());
+        let whole = [3.0, 4.0, 5.0].repeat(7);
+        assert_eq!(sum(&whole, |v| v * v), 350.0);
+        assert_eq!(product(&whole, &whole[1..]), 7.0 * 32.0 + 6.0 * 15.0);
+        assert_eq!(product(&whole, &[]), 0.0);
     }
 
     /// An autoregression driven by Student's t with three degrees of freedom, in two outputs of other size.
@@ -401,6 +448,19 @@ mod tests {
         let mut normal = noise.clone();
         normal.degrees = f64::INFINITY;
         assert!(normal.deviance(&residual, &mask) > deviance + 100.0);
+    }
+
+    #[test]
+    fn stretches_that_count_are_kept() {
+        let values = vec![(0..7).map(f64::from).collect::<Vec<_>>(); 2];
+        let mask = [
+            [false, true, true, false, false, true, true],
+            [true, false, false, false, false, false, false],
+        ]
+        .map(Vec::from)
+        .to_vec();
+        assert_eq!(kept(&values, &mask), [1.0, 2.0, 5.0, 6.0, 0.0]);
+        assert!(kept(&values, &vec![vec![false; 7]; 2]).is_empty());
     }
 
     #[test]

@@ -96,9 +96,12 @@ fn sized<const N: usize>(
     clock: &Clock,
 ) -> Option<Series> {
     let r = plant.inputs;
+    // By columns: the next state is a sum of them, all its numbers at once.
     let mut a = [[0.0; N]; N];
-    for (i, row) in a.iter_mut().enumerate() {
-        *row = array(&plant.a[i * N..(i + 1) * N]);
+    for (j, column) in a.iter_mut().enumerate() {
+        for (i, value) in column.iter_mut().enumerate() {
+            *value = plant.a[i * N + j];
+        }
     }
     let c: Vec<[f64; N]> = (0..plant.outputs).map(|o| array(plant.c_row(o))).collect();
     let b: Vec<[f64; N]> = (0..r).map(|j| array(&plant.b_column(j))).collect();
@@ -154,8 +157,10 @@ fn sized<const N: usize>(
         }
         for step in k * grid.steps..(k + 1) * grid.steps {
             let mut next = pushed;
-            for (next, row) in next.iter_mut().zip(&a) {
-                *next += dot(row, &x);
+            for (column, x) in a.iter().zip(&x) {
+                for (next, a) in next.iter_mut().zip(column) {
+                    *next += a * x;
+                }
             }
             if !forces.is_empty() && !next.iter().all(|v| v.abs() < DIVERGED) {
                 return None;

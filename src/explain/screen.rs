@@ -11,7 +11,7 @@ use super::data::{Data, Series};
 use super::effects::{self, Action, Clock, Definition, Sense};
 use super::fit::{Fit, Problem};
 use super::functionals::{Functionals, dot, matched_sign};
-use super::noise::Noise;
+use super::noise::{Noise, kept};
 use super::plant::Plant;
 use super::run::{Grid, run};
 use super::structure::{Direction, Instance, Signal, Structure};
@@ -168,15 +168,7 @@ impl<'a> Bench<'a> {
 
     /// Whitened, weighted, without the values that do not count.
     pub fn flatten(&self, series: &Series) -> Vec<f64> {
-        let mut flat = Vec::with_capacity(self.weights.len());
-        for (column, mask) in self.noise.whiten(series).iter().zip(&self.problem.mask) {
-            flat.extend(
-                column
-                    .iter()
-                    .zip(mask)
-                    .filter_map(|(v, keep)| keep.then_some(*v)),
-            );
-        }
+        let mut flat = kept(&self.noise.whiten(series), &self.problem.mask);
         for (v, w) in flat.iter_mut().zip(&self.weights) {
             *v *= w;
         }
