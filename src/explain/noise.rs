@@ -467,25 +467,37 @@ mod tests {
     fn what_the_mask_leaves_out_does_not_count() {
         let (mut residual, mut mask) = heavy(1000);
         for (column, mask) in residual.iter_mut().zip(&mut mask) {
-            for k in 400..500 {
-                column[k] = 1e6;
-            }
+            column[400..500].fill(1e6);
             // The filters reach across the gap's end.
-            for k in 400..500 + MOST_ORDER {
-                mask[k] = false;
-            }
+            mask[400..500 + MOST_ORDER].fill(false);
         }
         let noise = Noise::estimate(&residual, 2, &mask, MOST_ORDER);
         assert!(noise.scale[0] < 0.3 && noise.scale[1] < 60.0, "{noise:?}");
     }
 
+    /// By Schwarz a coefficient that is not there is taken in half a percent of the cases for each order that is tried; by
+    /// Akaike it would be in a sixth.
     #[test]
-    fn white_noise_stays_white_and_gaussian() {
+    fn white_noise_stays_white() {
+        let normal = rand_distr::StandardNormal;
+        let coloured = (0..40)
+            .filter(|seed| {
+                let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(*seed);
+                let series: Series = vec![(0..3000).map(|_| normal.sample(&mut random)).collect()];
+                let mask = vec![vec![true; 3000]];
+                !Noise::estimate(&series, 1, &mask, MOST_ORDER).ar[0].is_empty()
+            })
+            .count();
+        assert!(coloured <= 3, "{coloured} of 40");
+    }
+
+    #[test]
+    fn white_noise_is_gaussian_of_its_size() {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(8);
         let normal = rand_distr::StandardNormal;
         let series: Series = vec![(0..3000).map(|_| normal.sample(&mut random)).collect()];
         let mask = vec![vec![true; 3000]];
-        let noise = Noise::estimate(&series, 1, &mask, MOST_ORDER);
+        let noise = Noise::estimate(&series, 1, &mask, 0);
         assert_eq!((noise.ar[0].len(), noise.degrees), (0, f64::INFINITY));
         assert!((noise.scale[0] - 1.0).abs() < 0.05);
         assert_eq!(noise.len(), 1);

@@ -202,3 +202,95 @@ fn improvement(
     gains.sort_by(f64::total_cmp);
     Some([gains[DRAWS / 40], gains[DRAWS - 1 - DRAWS / 40]])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::data::Segment;
+
+    const N: usize = 2000;
+
+    fn wave(size: f64, rate: f64) -> Vec<f64> {
+        (0..N).map(|k| size * (rate * k as f64).sin()).collect()
+    }
+
+    fn data() -> Data {
+        Data {
+            segments: vec![Segment {
+                inputs: vec![vec![0.0; N]],
+                outputs: vec![wave(1.0, 0.31)],
+                start_time: 0.0,
+            }],
+            sample_time: 1.0,
+            inputs: 1,
+            outputs: 1,
+            constant: false,
+        }
+    }
+
+    #[test]
+    fn a_quarter_is_held_out_in_blocks_all_over() {
+        let data = data();
+        let mask = vec![vec![true; N]];
+        let (train, test) = split(&data, &mask);
+        let held = test[0].iter().filter(|keep| **keep).count();
+        assert_eq!(held, (SHARE * N as f64) as usize);
+        assert!(train[0].iter().zip(&test[0]).all(|(a, b)| a != b));
+        // One block in each fifth, none at the ends.
+        for fifth in test[0].chunks(N / 5) {
+            assert_eq!(fifth.iter().filter(|keep| **keep).count(), held / 5);
+            assert!(!fifth[0] && !fifth[N / 5 - 1]);
+        }
+    }
+
+    /// Errors of 0.9, 0.5 and 0.1 of the output: figures, noise floor, and an improvement over other parameters, not over the
+    /// simulation.
+    #[test]
+    fn figures_are_those_of_the_errors() {
+        let data = data();
+        let mask = vec![vec![true; N]];
+        let errors = [0.9, 0.5, 0.1].map(|size| vec![wave(size, 0.31)]);
+        let found = steps(
+            &data,
+            &Steps {
+                simulation: &errors[0],
+                parameters_only: &errors[1],
+                augmented: &errors[2],
+                structure_share: 0.75,
+            },
+            &mask,
+            0,
+            Some(1),
+        );
+        for (figure, size) in [
+            (found.simulation, 0.9),
+            (found.parameters_only, 0.5),
+            (found.augmented, 0.1),
+            // A quarter of the variance is noise.
+            (found.noise_floor, 0.05),
+        ] {
+            assert!((figure.rmse - size * 0.5_f64.sqrt()).abs() < 1e-3);
+            assert!((figure.fit_percent - 100.0 * (1.0 - size)).abs() < 0.01);
+        }
+        let [low, high] = found.improvement_95.unwrap();
+        let gained = 0.4 * 0.5_f64.sqrt();
+        assert!(
+            low <= gained + 1e-3 && gained - 1e-3 <= high,
+            "{low} {high}"
+        );
+        assert!(high - low < 0.05, "{low} {high}");
+    }
+
+    #[test]
+    fn each_half_answers_for_the_other() {
+        let mask = vec![vec![true; N]];
+        // A fit that is perfect where it was made, and off by 1 and 3 where it was not.
+        let error = across_halves(&mask, |own| {
+            let off = if own[0][0] { 1.0 } else { 3.0 };
+            let residual = own[0].iter().map(|own| if *own { 0.0 } else { off });
+            Some(vec![residual.collect()])
+        });
+        assert!((error.unwrap() - 5.0_f64.sqrt()).abs() < 1e-12);
+        assert!(across_halves(&mask, |own| own[0][0].then(|| vec![vec![0.0; N]])).is_none());
+    }
+}

@@ -217,3 +217,29 @@ pub(crate) fn look_alikes(a: &str, b: &str) -> bool {
         .iter()
         .any(|kind| kind.contains(&a) && kind.contains(&b))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_effect_must_bring_a_share_of_the_first() {
+        assert_eq!(required(100.0), 30.0);
+        assert_eq!(required(2000.0), 200.0);
+    }
+
+    #[test]
+    fn effects_of_one_kind_are_not_told_apart() {
+        assert!(look_alikes("cubic_stiffness", "end_stop"));
+        assert!(look_alikes("input_backlash", "coulomb_friction"));
+        assert!(!look_alikes("coulomb_friction", "cubic_stiffness"));
+        for kind in KINDS {
+            for id in *kind {
+                assert!(
+                    crate::explain::effects::library().any(|d| d.id == *id),
+                    "{id}"
+                );
+            }
+        }
+    }
+}

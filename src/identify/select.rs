@@ -405,18 +405,26 @@ fn choose_order(
     // Where the past window cuts off too much, the cost holds that as well, and the test says nothing about the order.
     let cut_off = estimator.candidate(start)?.truncation;
     if cut_off > LARGEST_FOR_POLISH {
-        for order in start + 1..=(start + order::ORDERS_ABOVE).min(largest) {
-            test(evidence, estimator, order)?;
-            match find(evidence, order) {
-                Some(more) if more.schwarz < best.schwarz => best = more,
-                _ => break,
+        let above: Vec<usize> = (start + 1..=(start + order::ORDERS_ABOVE).min(largest)).collect();
+        // A state too many may be what lasts longer than the window.
+        let below: Vec<usize> = (1..start).rev().collect();
+        for direction in [above, below] {
+            for order in direction {
+                test(evidence, estimator, order)?;
+                match find(evidence, order) {
+                    Some(other) if other.schwarz < best.schwarz => best = other,
+                    _ => break,
+                }
+            }
+            if best.order != start {
+                break;
             }
         }
         return Ok((
             best.order,
             format!(
-                "order {}: smallest Schwarz criterion; the past window cuts off too much (truncation {cut_off:.1}) for \
-                 the chi-square test to tell",
+                "order {}: smallest Schwarz criterion; the past window cuts off too much of order {start} (truncation \
+                 {cut_off:.1}) for the chi-square test to tell",
                 best.order
             ),
         ));

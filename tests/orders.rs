@@ -1,0 +1,76 @@
+//! The choice of the order where the test of the whole model is blind: a window of 60 samples gives it a hundred degrees of
+//! freedom, in which a weak state hardly shows.
+
+use innovant::identify::{OrderEvidence, identify};
+use innovant::systems::TestSystem;
+use innovant::{Model, Options};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+/// A slow pole, and an alternating one that answers `weak` times as strongly.
+fn two_poles(weak: f64) -> TestSystem {
+    TestSystem {
+        system: innovant::model::StateSpace {
+            a: DMatrix::from_diagonal(&[0.8, -0.7].to_vec().into()),
+            b: DMatrix::from_column_slice(2, 1, &[1.0, weak]),
+            c: DMatrix::from_row_slice(1, 2, &[1.0, 1.0]),
+            d: DMatrix::zeros(1, 1),
+            k: DMatrix::from_column_slice(2, 1, &[0.3, 0.0]),
+            sample_time: 1.0,
+        },
+        innovation_covariance: DMatrix::identity(1, 1),
+        feedback: DMatrix::zeros(1, 1),
+    }
+}
+
+fn identified(plant: &TestSystem, runs: u64) -> Vec<Model> {
+    let options = Options {
+        past: Some(60),
+        ..Options::default()
+    };
+    (0..runs)
+        .into_par_iter()
+        .map(|seed| identify(&[plant.record(3000, seed)], &options).unwrap())
+        .collect()
+}
+
+fn evidence(model: &Model, order: usize) -> Option<&OrderEvidence> {
+    let summary = model.summary.as_ref()?;
+    let orders = &summary.diagnostics.orders;
+    orders.iter().find(|e| e.order == order)
+}
+
+#[test]
+fn a_weak_state_is_kept_where_schwarz_would_regret_it() {
+    let mut blind = 0;
+    for model in identified(&two_poles(0.08), 24) {
+        let (Some(one), Some(two)) = (evidence(&model, 1), evidence(&model, 2)) else {
+            continue;
+        };
+        let accepted = one.p_value.is_some_and(|p| p >= 0.01);
+        if let (true, Some(without), Some(with)) = (accepted, one.schwarz, two.schwarz)
+            && without > with
+        {
+            blind += 1;
+            assert!(model.system.states() >= 2, "{without} without, {with} with");
+        }
+    }
+    assert!(blind >= 3, "the test was blind {blind} times only");
+}
+
+/// A mode that noise makes may ring longer than the window: then no test can be asked, and a lower order must be tried too.
+#[test]
+fn modes_that_only_noise_has_are_dropped() {
+    let models = identified(&two_poles(0.07), 24);
+    let orders: Vec<usize> = models.iter().map(|m| m.system.states()).collect();
+    let high = orders.iter().filter(|order| **order > 2).count();
+    assert!(high <= 2, "{orders:?}");
+    // Three or more were proposed, and cut off.
+    let cut_off = |m: &&Model| {
+        let summary = m.summary.as_ref().unwrap();
+        let mut lines = summary.explanation.iter();
+        lines.any(|line| line.contains("cuts off too much"))
+    };
+    let dropped = models.iter().filter(cut_off).count();
+    assert!(dropped >= 1, "{orders:?}");
+}
