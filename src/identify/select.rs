@@ -406,26 +406,24 @@ fn choose_order(
     let cut_off = estimator.candidate(start)?.truncation;
     if cut_off > LARGEST_FOR_POLISH {
         let above: Vec<usize> = (start + 1..=(start + order::ORDERS_ABOVE).min(largest)).collect();
-        // A state too many may be what lasts longer than the window.
+        // A state too many, which only noise has, may be what lasts longer than the window.
         let below: Vec<usize> = (1..start).rev().collect();
         for direction in [above, below] {
+            let mut last = best.schwarz;
             for order in direction {
                 test(evidence, estimator, order)?;
                 match find(evidence, order) {
-                    Some(other) if other.schwarz < best.schwarz => best = other,
+                    Some(next) if next.schwarz < last => last = next.schwarz,
                     _ => break,
                 }
             }
-            if best.order != start {
-                break;
-            }
         }
+        let order = best_by_schwarz(evidence, |_| true).unwrap_or(start);
         return Ok((
-            best.order,
+            order,
             format!(
-                "order {}: smallest Schwarz criterion; the past window cuts off too much of order {start} (truncation \
-                 {cut_off:.1}) for the chi-square test to tell",
-                best.order
+                "order {order}: smallest Schwarz criterion; the past window cuts off too much of order {start} \
+                 (truncation {cut_off:.1}) for the chi-square test to tell"
             ),
         ));
     }
