@@ -317,3 +317,19 @@ fn covariances_are_some() {
 fn damage_is_named_before_what_it_looks_like() {
     hostile::csv_reader(&[0x07, 0x00, 0xFF, 0x2C, 0x08, 0x00, 0x00, 0x00]);
 }
+
+/// A part of a recording was infinitely many times as far off as the rest, which is no number of a document.
+#[test]
+fn what_is_off_in_one_part_only_is_said_in_numbers() {
+    hostile::explain(include_bytes!(
+        "hostile/found/explain_nothing_to_compare_with"
+    ));
+}
+
+/// Steps of a recording whose signals are next to dependent biased its model by what is no number.
+#[test]
+fn rounding_that_biases_without_bound_is_said_in_numbers() {
+    hostile::identify(include_bytes!(
+        "hostile/found/identify_rounding_without_bound"
+    ));
+}

@@ -69,8 +69,11 @@ pub fn explain(
         .then(|| inquire(&known.data, &known.structure, &allowed))
         .flatten();
     let (known, finding, mask) = match (drive, ordinary) {
-        (Some((drive, averaged, _)), Some((finding, mask)))
-            if tells_more((&finding, &known.data), (&averaged, &drive.data)) =>
+        (Some((drive, averaged, counted)), Some((finding, mask)))
+            if tells_more(
+                (&finding, &known.data, &mask),
+                (&averaged, &drive.data, &counted),
+            ) =>
         {
             (known, finding, mask)
         }
@@ -93,8 +96,10 @@ pub fn explain(
 }
 
 /// Whether a free-run fit tells more of a drive than its averaged equation, which leaves structure.
-fn tells_more(free_run: (&Finding, &Data), averaged: (&Finding, &Data)) -> bool {
-    let ((free_run, fitted), (equation, whole)) = (free_run, averaged);
+fn tells_more(
+    (free_run, fitted, mask): (&Finding, &Data, &Mask),
+    (equation, whole, counted): (&Finding, &Data, &Mask),
+) -> bool {
     // Where a free run drifts, a trend stands for whatever it misses.
     let trend = free_run.model.structure.new_effects().iter().any(|e| {
         matches!(
@@ -112,8 +117,8 @@ fn tells_more(free_run: (&Finding, &Data), averaged: (&Finding, &Data)) -> bool 
         return false;
     }
     match (
-        free_run.error_across_halves(fitted),
-        equation.error_across_halves(whole),
+        free_run.error_across_halves(fitted, mask),
+        equation.error_across_halves(whole, counted),
     ) {
         (Some(free), Some(averaged)) => free < MUCH_BETTER * averaged,
         // What a half does not determine has nothing to say of the other.

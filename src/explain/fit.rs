@@ -4,6 +4,9 @@
 //! parameters differ by ten decades in scale, and most laws are not smooth everywhere. Tails are met by iterated
 //! weights (Student's t), the noise model is estimated anew between rounds.
 
+#[cfg(test)]
+mod tests;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 

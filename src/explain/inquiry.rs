@@ -6,6 +6,7 @@ use super::effects::{self, Definition, Unit};
 use super::exact::{Freeze, frozen};
 use super::explanation::Verdict;
 use super::fit::{Effort, Fit, Problem};
+use super::noise::Mask;
 use super::plausible::{add_free_twins, plant_may_stay, pulls, reaches, sane};
 use super::refine::{FURTHER, REFINEMENTS, decides_within, derived, finer_steps};
 use super::search::{Boring, Ranked, single_effects};
@@ -68,10 +69,13 @@ pub(crate) struct Finding {
 
 impl Finding {
     /// Root mean square free-run error of each half of `data` when the numbers of the model that stands are fitted to the
-    /// other, over the standard deviation of what was recorded; `None` where a half does not determine them. Of drives: one
-    /// output.
-    pub fn error_across_halves(&self, data: &Data) -> Option<f64> {
-        let problem = Problem::new(data);
+    /// other, over the standard deviation of what was recorded, where `mask` counts; `None` where a half does not determine
+    /// them. Of drives: one output.
+    pub fn error_across_halves(&self, data: &Data, mask: &Mask) -> Option<f64> {
+        let problem = Problem {
+            mask: mask.clone(),
+            ..Problem::new(data)
+        };
         let error = match &self.weak {
             Some(proof) => proof.error_across_halves(&problem),
             None => super::prove::across_halves(&problem.mask, |own| {
@@ -87,7 +91,7 @@ pub(crate) fn inquire(
     data: &Data,
     structure: &Structure,
     allowed: &(dyn Fn(&Definition) -> bool + Sync),
-) -> Option<(Finding, super::noise::Mask)> {
+) -> Option<(Finding, Mask)> {
     let mut problem = Problem::new(data);
     let said = structure.simulate(&structure.given(), data)?;
     let freezes = if allowed(effects::find("sensor_freeze", "")?) {

@@ -17,6 +17,8 @@ const THROUGHOUT: f64 = 0.6;
 const EXCESS_DB: f64 = 1.0;
 /// Ratio from which an operating region is listed.
 const REGION: f64 = 1.5;
+/// Nothing is said to be more times as large as something else: the square of the sixteen digits that a number has.
+const MOST_TIMES: f64 = 1e32;
 /// Bands of the frequency map, about.
 const BANDS: usize = 16;
 
@@ -26,8 +28,13 @@ pub(crate) fn excess(residual: &Series, noise: &Noise) -> Series {
     noise
         .whiten(residual)
         .iter()
-        .map(|e| e.iter().map(|v| v * v).collect())
+        .map(|e| e.iter().map(|v| (v * v).min(MOST_TIMES)).collect())
         .collect()
+}
+
+/// How many times `there` what is found `elsewhere`.
+fn times(there: f64, elsewhere: f64) -> f64 {
+    (there / elsewhere.max(1e-300)).min(MOST_TIMES)
 }
 
 /// Multi-scale windows of segment 0 in which `squares` exceeds noise, `[from s, to s, mean square]`; empty when that is
@@ -186,10 +193,11 @@ pub(crate) fn frequencies(before: &[(f64, f64)], after: &[(f64, f64)]) -> Vec<[f
         .filter_map(|(from, to)| {
             let sum = |s: &[(f64, f64)]| s[from..to].iter().map(|p| p.1).sum::<f64>();
             let (b, a) = (sum(before), sum(after));
-            let db = 10.0 * (b / a.max(1e-300)).log10();
+            let ratio = times(b, a);
+            let db = 10.0 * ratio.log10();
             // The window correlates neighbours: about 2/3 of the bins are independent, two degrees of freedom each.
             let freedom = 2.0 * (to - from) as f64 * 0.66;
-            let p = ChiSquared::new(freedom).map_or(1.0, |d| d.sf(freedom * b / a.max(1e-300)));
+            let p = ChiSquared::new(freedom).map_or(1.0, |d| d.sf(freedom * ratio));
             (db > EXCESS_DB && p * tests < LEVEL).then(|| [before[from].0, before[to - 1].0, db])
         })
         .collect()
@@ -286,9 +294,8 @@ pub(crate) fn regimes(
             if n_in < 20.0 || n_out < 20.0 {
                 continue;
             }
-            let elsewhere = f64::max(outside / n_out, 1e-300);
-            let ratio = inside / n_in / elsewhere;
-            let p = ChiSquared::new(n_in).map_or(1.0, |d| d.sf(inside / elsewhere)) * tests;
+            let ratio = times(inside / n_in, outside / n_out);
+            let p = ChiSquared::new(n_in).map_or(1.0, |d| d.sf(n_in * ratio)) * tests;
             if ratio > REGION && p < LEVEL {
                 found.push(Regime {
                     variable: name.clone(),
@@ -303,4 +310,113 @@ pub(crate) fn regimes(
     found.sort_by(|a, b| b.excess.total_cmp(&a.excess));
     found.truncate(6);
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::data::Segment;
+
+    fn data(samples: usize) -> Data {
+        Data {
+            segments: vec![Segment {
+                inputs: vec![vec![0.0; samples]],
+                outputs: vec![vec![0.0; samples]],
+                start_time: 5.0,
+            }],
+            sample_time: 0.1,
+            inputs: 1,
+            outputs: 1,
+            constant: false,
+        }
+    }
+
+    /// Squares of noise with unit variance, by a generator of their own.
+    fn noise(samples: usize, seed: u64) -> Vec<f64> {
+        let mut state = seed;
+        let mut uniform = move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+        };
+        (0..samples)
+            .map(|_| -2.0 * uniform().ln() * (std::f64::consts::TAU * uniform()).cos().powi(2))
+            .collect()
+    }
+
+    #[test]
+    fn a_window_is_where_squares_exceed_noise() {
+        let n = 2000;
+        let data = data(n);
+        let mask: Mask = vec![vec![true; n]];
+        let (mut alarms, mut apart) = (0, 0.0);
+        for seed in 0..200 {
+            let quiet = vec![noise(n, seed)];
+            alarms += usize::from(!windows(&data, &quiet, &mask).is_empty());
+            let mut loud = quiet;
+            loud[0][1200..1300].iter_mut().for_each(|e| *e += 6.0);
+            let found = windows(&data, &loud, &mask);
+            assert_eq!(found.len(), 1, "{found:?}");
+            let [from, to, strength] = found[0];
+            apart += (from - 125.0).abs() + (to - 135.0).abs();
+            assert!((strength - 7.0).abs() < 1.0, "{strength}");
+            // What does not count shows nothing.
+            let hidden: Mask = vec![(0..n).map(|k| !(1150..1350).contains(&k)).collect()];
+            assert!(windows(&data, &loud, &hidden).len() <= 1);
+        }
+        // Ends are found to some samples.
+        assert!(apart / 400.0 < 0.6, "{}", apart / 400.0);
+        // A level of 1e-3 for the whole map.
+        assert!(alarms <= 2, "{alarms} windows of 200 without any");
+        let everywhere = vec![noise(n, 7).iter().map(|e| 3.0 * e).collect()];
+        assert!(windows(&data, &everywhere, &mask).is_empty());
+    }
+
+    #[test]
+    fn a_band_is_where_power_exceeds_what_is_left() {
+        // A line of power 200 at 1.25 Hz in noise of power 2 on a bandwidth of 5 Hz.
+        let n = 4000;
+        let residual = |line: f64| -> Series {
+            let e = noise(n, 3);
+            let sign = noise(n, 4);
+            vec![
+                (0..n)
+                    .map(|k| {
+                        let t = 0.1 * k as f64;
+                        let white = if sign[k] > 0.455 { 1.0 } else { -1.0 } * e[k].sqrt();
+                        white + line * (std::f64::consts::TAU * 1.25 * t).sin()
+                    })
+                    .collect(),
+            ]
+        };
+        let quiet = spectrum(&residual(0.0), 1, 0, 0.1);
+        // Two-sided: the mean over frequency is variance times sample time.
+        let mean = quiet.iter().map(|p| p.1).sum::<f64>() / quiet.len() as f64;
+        assert!((mean / 0.1 - 1.0).abs() < 0.1, "{mean}");
+        let found = frequencies(&spectrum(&residual(1.0), 1, 0, 0.1), &quiet);
+        assert_eq!(found.len(), 1, "{found:?}");
+        let [from, to, db] = found[0];
+        assert!(from < 1.25 && 1.25 < to && db > 3.0, "{found:?}");
+        assert!(frequencies(&quiet, &quiet).is_empty());
+        // Decibels, of many bins each where they are drawn closely.
+        let picture = spectrum_picture(&quiet, &quiet);
+        assert!(picture.iter().all(|p| p[1] == p[2]));
+        assert!(
+            picture[picture.len() - 10..]
+                .iter()
+                .all(|p| (p[1] + 10.0).abs() < 1.5)
+        );
+    }
+
+    #[test]
+    fn what_has_nothing_to_compare_with_is_said_in_numbers() {
+        let before: Vec<(f64, f64)> = (0..200).map(|i| (f64::from(i), 1e200)).collect();
+        let after: Vec<(f64, f64)> = (0..200).map(|i| (f64::from(i), 0.0)).collect();
+        for band in frequencies(&before, &after) {
+            assert_eq!(band[2], 320.0);
+        }
+        assert_eq!(times(1e9, 0.0), MOST_TIMES);
+        assert_eq!(times(6.0, 2.0), 3.0);
+    }
 }

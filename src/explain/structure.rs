@@ -4,6 +4,9 @@
 //! every segment, the levels of the outputs, and the numbers of each effect. Logarithmic parameters are held as
 //! logarithms.
 
+#[cfg(test)]
+mod tests;
+
 use std::borrow::Cow;
 use std::sync::Arc;
 

@@ -132,8 +132,13 @@ fn bias(varx: &Varx, channel: usize, step: f64, scale: &[f64]) -> Result<f64, Li
         Err(_) => solve_upper_transposed(factor, &moved),
     };
     let upper = cholesky_upper(&varx.innovation_covariance)?;
-    Ok(solve_upper_transposed(&upper, &error.transpose()).norm())
+    let bias = solve_upper_transposed(&upper, &error.transpose()).norm();
+    // Also what is no number, where the signals are next to dependent.
+    Ok(bias.min(MOST_DEVIATIONS))
 }
+
+/// A bias of so many standard deviations says that the stated uncertainty says nothing; more would say no more.
+const MOST_DEVIATIONS: f64 = 1e6;
 
 #[cfg(test)]
 mod tests {

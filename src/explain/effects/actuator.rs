@@ -321,8 +321,9 @@ fn lag(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
     let a = clock.step / p[0];
     let decay = (-a).exp();
     let mean_of_decay = -(-a).exp_m1() / a;
-    let moment_of_decay = if a < 1e-3 {
-        -a / 12.0
+    // `int_0^1 (x - 1/2) exp(-a x) dx`; the closed form cancels where little decays.
+    let moment_of_decay = if a < 1e-2 {
+        a * (-1.0 / 12.0 + a * (1.0 / 24.0 - a / 80.0))
     } else {
         (1.0 - (1.0 + a) * decay) / (a * a) - 0.5 * mean_of_decay
     };

@@ -169,6 +169,8 @@ pub(super) static ENTRIES: &[Definition] = &[
 
 /// Steps of the search for the force of a smooth knee; three are typical, halving alone reaches 1e-12.
 const KNEE_STEPS: usize = 40;
+/// The same for the force of bristles; two are typical, halving alone reaches 1e-8.
+const BRISTLE_STEPS: usize = 30;
 
 fn no_shape(_: &Observed) -> Vec<Vec<f64>> {
     vec![vec![]]
@@ -251,21 +253,36 @@ fn bristle_force(
     let free = motion.middle();
     let damping = time / motion.clock.step;
     let gain = (0.5 * motion.position_gain * strength).max(0.0);
-    // force(free - gain f) - f falls monotonically with f: Newton's steps from the last force.
-    let mut f = last;
-    let mut z = before;
-    for _ in 0..4 {
+    // force(free - gain f) - f falls monotonically with f: Newton's steps from the last force, within a bracket that
+    // shrinks, since bristles that are shorter than what their force moves in a step saturate on either side.
+    let most = 1.0 + 2.0 * damping;
+    let (mut low, mut high) = (-most, most);
+    let mut f = last.clamp(low, high);
+    for _ in 0..BRISTLE_STEPS {
         let moved = free - gain * f - from;
         let side = moved.signum();
-        z = side - (side - before) * decay(moved.abs() / distance);
+        let z = side - (side - before) * decay(moved.abs() / distance);
         let excess = z + damping * (z - before) - f;
+        if excess > 0.0 {
+            low = f;
+        } else {
+            high = f;
+        }
         let slope = 1.0 + gain * (1.0 + damping) * (1.0 - side * z) / distance;
-        let step = excess / slope;
-        f += step;
-        if step.abs() < 1e-5 {
+        let next = f + excess / slope;
+        let next = if next >= low && next <= high {
+            next
+        } else {
+            0.5 * (low + high)
+        };
+        let settled = (next - f).abs() < 1e-5;
+        f = next;
+        if settled {
             break;
         }
     }
+    // The deflection that makes this force; the position is too rough where the bristles are short.
+    let z = (f + damping * before) / (1.0 + damping);
     *memory = [z.clamp(-1.0, 1.0), free - gain * f, f];
     -strength * f
 }

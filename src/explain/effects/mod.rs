@@ -13,6 +13,8 @@ mod linear;
 mod process;
 mod sensor;
 mod stiffness;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use law::{Clock, Motion, Observed, decay, level};
 

@@ -1,0 +1,166 @@
+use std::sync::Arc;
+
+use super::*;
+use crate::explain::coordinates::Coordinates;
+use crate::explain::data::Segment;
+use crate::explain::effects;
+use crate::explain::plant::Plant;
+use crate::explain::structure::{Direction, Instance, Signal};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+const N: usize = 800;
+const NOISE: f64 = 0.05;
+
+/// A mass on a spring that stiffens.
+fn structure() -> Structure {
+    let plant = Plant {
+        states: 2,
+        inputs: 1,
+        outputs: 1,
+        a: vec![0.95, 0.09, -0.9, 0.85],
+        b: vec![0.005, 0.09],
+        c: vec![1.0, 0.0],
+        d: vec![0.0],
+        sample_time: 0.1,
+    };
+    Structure {
+        coordinates: Arc::new(Coordinates::new(&plant)),
+        plant_free: true,
+        initial_free: false,
+        initial: vec![vec![0.0; 2]],
+        feedthrough_free: false,
+        substeps: 1,
+        effects: vec![Instance {
+            definition: effects::find("cubic_stiffness", "").unwrap(),
+            channel: 0,
+            signal: Signal::Output(0),
+            direction: Direction::Matched(0),
+        }],
+        known: Vec::new(),
+        adjusted: 0,
+    }
+}
+
+fn truth() -> Vec<f64> {
+    let mut theta = structure().given();
+    theta.push(1.5);
+    theta
+}
+
+fn recording(seed: u64) -> Data {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut normal = || -> f64 { random.sample(StandardNormal) };
+    let mut data = Data {
+        segments: vec![Segment {
+            inputs: vec![(0..N).map(|_| 2.0 * normal()).collect()],
+            outputs: vec![vec![0.0; N]],
+            start_time: 0.0,
+        }],
+        sample_time: 0.1,
+        inputs: 1,
+        outputs: 1,
+        constant: false,
+    };
+    let mut y = structure().simulate(&truth(), &data).unwrap();
+    y[0].iter_mut().for_each(|y| *y += NOISE * normal());
+    data.segments[0].outputs = y;
+    data
+}
+
+#[test]
+fn slopes_are_those_of_central_differences() {
+    let data = recording(1);
+    let problem = Problem::new(&data);
+    let structure = structure();
+    let mut fit = Fit::at(&problem, structure.clone(), truth()).unwrap();
+    for (i, slope) in fit.sensitivities(&problem).into_iter().enumerate() {
+        let moved = |by: f64| {
+            let mut theta = truth();
+            theta[i] += by;
+            structure.simulate(&theta, &data).unwrap()
+        };
+        let h = 1e-5;
+        let central = difference(&moved(h), &moved(-h));
+        let slope = slope.unwrap();
+        let size = sum_of_squares(&slope[0]).sqrt();
+        for (a, b) in slope[0].iter().zip(&central[0]) {
+            assert!((a - b / (2.0 * h)).abs() < 2e-3 * size, "{i}: {a} {b}");
+        }
+    }
+}
+
+/// Estimates scatter about the truth as their stated covariance says, and their halves agree as often as they should.
+#[test]
+fn numbers_are_as_certain_as_is_said() {
+    let runs = 60u32;
+    let fits: Vec<(Vec<f64>, Certainty)> = (0..runs)
+        .into_par_iter()
+        .map(|seed| {
+            let data = recording(100 + u64::from(seed));
+            let problem = Problem::new(&data);
+            // From a plant a little off, and no spring that stiffens.
+            let mut start: Vec<f64> = truth().iter().map(|v| 1.02 * v).collect();
+            *start.last_mut().unwrap() = 0.0;
+            let mut fit = Fit::run(&problem, structure(), start, None, Effort::FINAL).unwrap();
+            let certainty = fit.certainty(&problem).unwrap();
+            (fit.theta, certainty)
+        })
+        .collect();
+    for (i, truth) in truth().into_iter().enumerate() {
+        let squares: f64 = fits
+            .iter()
+            .map(|(theta, certainty)| (theta[i] - truth).powi(2) / certainty.covariance[(i, i)])
+            .sum();
+        let apart: f64 = fits
+            .iter()
+            .map(|(_, c)| c.halves_disagree.as_ref().unwrap()[i].powi(2))
+            .sum();
+        // Chi-squared with 60 degrees of freedom: 0.2 of its mean is a standard deviation.
+        for mean in [squares, apart].map(|sum| sum / f64::from(runs)) {
+            assert!((0.4..1.7).contains(&mean), "number {i}: {mean}");
+        }
+    }
+}
+
+#[test]
+fn the_lesser_criterion_is_better() {
+    let data = recording(3);
+    let problem = Problem::new(&data);
+    let count = problem.count();
+    let right = Fit::at(&problem, structure(), truth()).unwrap();
+    let mut worse_theta = truth();
+    worse_theta[0] *= 0.9;
+    let worse = Fit::at(&problem, structure(), worse_theta).unwrap();
+    assert!(right.criterion(count) + 50.0 < worse.criterion(count));
+    let mut kept = right.clone();
+    kept.better_of(worse.clone(), count);
+    assert_eq!(kept.theta, right.theta);
+    let mut taken = worse;
+    taken.better_of(right.clone(), count);
+    assert_eq!(taken.theta, right.theta);
+    // Schwarz: a number more costs the logarithm of the count.
+    let more = Fit {
+        free: right.free + 1,
+        ..right.clone()
+    };
+    let cost = more.criterion(count) - right.criterion(count);
+    assert!((cost - (count as f64).ln()).abs() < 1e-9);
+}
+
+#[test]
+fn sizes_are_in_deviations_of_the_outputs() {
+    let data = recording(4);
+    let mut problem = Problem::new(&data);
+    let scale = problem.scale[0];
+    let half: Series = vec![vec![0.5 * scale; N]];
+    assert!((problem.size(&half) - 0.5).abs() < 1e-12);
+    assert!((problem.mean_square(&half) - 0.25).abs() < 1e-12);
+    // Only what counts.
+    let mut loud = half;
+    loud[0][100..200].fill(1e3);
+    problem.mask[0][100..200].fill(false);
+    assert!((problem.mean_square(&loud) - 0.25).abs() < 1e-12);
+    assert_eq!(problem.count(), N - MOST_ORDER - 100);
+}
