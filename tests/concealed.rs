@@ -5,7 +5,8 @@
 //! ```
 //!
 //! prints what was concealed against what was said. `INNOVANT_CONCEALED_CASES` sets how many cases conceal an effect
-//! (40), `INNOVANT_CONCEALED_NULLS` how many conceal nothing, `INNOVANT_CONCEALED_SEED` draws others, and
+//! (40), `INNOVANT_CONCEALED_NULLS` how many conceal nothing (24), `INNOVANT_CONCEALED_LEFT_OUT` how many effects are asked
+//! for again without their entry in the library (8), `INNOVANT_CONCEALED_SEED` draws others, and
 //! `INNOVANT_CONCEALED_SAMPLES` sets their length; `INNOVANT_CONCEALED_FOLDER` keeps the cases that were not answered
 //! rightly, as files with their truth.
 
@@ -55,6 +56,13 @@ fn concealed_effects_are_named() {
     assert!(
         alarms <= most(0.01, answers.nulls.len()),
         "{alarms} false alarms"
+    );
+    // What is not in the library is not called something else more often than not.
+    let invented = count(&answers.left_out, Outcome::Wrong);
+    let asked = answers.left_out.len();
+    assert!(
+        2 * invented <= asked,
+        "{invented} of {asked} took another name"
     );
     // Eight of ten, with 1.6 standard deviations of slack: 28 of 40.
     let n = effects.len() as f64;

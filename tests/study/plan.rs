@@ -50,7 +50,8 @@ impl Plan {
             samples: variable("INNOVANT_CONCEALED_SAMPLES").unwrap_or(2000),
             effects,
             nulls: variable("INNOVANT_CONCEALED_NULLS").unwrap_or(effects * 3 / 5),
-            left_out: (effects * 2 / 5).min(effects),
+            left_out: variable("INNOVANT_CONCEALED_LEFT_OUT")
+                .map_or(effects / 5, |n: usize| n.min(effects)),
             unlisted: effects / 10,
         }
     }
