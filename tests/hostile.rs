@@ -333,3 +333,11 @@ fn rounding_that_biases_without_bound_is_said_in_numbers() {
         "hostile/found/identify_rounding_without_bound"
     ));
 }
+
+/// A simulation none of whose states shows in an output panicked.
+#[test]
+fn states_that_no_output_sees_are_left_out() {
+    hostile::explain(include_bytes!(
+        "hostile/found/explain_states_that_no_output_sees"
+    ));
+}

@@ -61,10 +61,11 @@ impl Coordinates {
         for (i, row) in rows.iter().enumerate() {
             t.set_row(i, &row.row(0));
         }
-        let inverse = t
-            .clone()
-            .pseudo_inverse(1e-14)
-            .unwrap_or_else(|_| DMatrix::zeros(n, seen));
+        // Where no output sees any state there is nothing to invert.
+        let inverse = Some(t.clone())
+            .filter(|t| !t.is_empty())
+            .and_then(|t| t.pseudo_inverse(1e-14).ok())
+            .unwrap_or_else(|| DMatrix::zeros(n, seen));
         let mut given = plant.transformed(&t, &inverse);
         given.states = seen;
         tidy(&mut given, &chains, scale);
