@@ -189,6 +189,39 @@ fn recordings_that_say_too_little() {
     );
 }
 
+/// A short recording is asked what is left of it, about less.
+#[test]
+fn short_recordings_are_tested_too() {
+    let folder = Folder::new();
+    let Signals { u, y, simulated } = signals(200);
+    folder.text("recording.csv", &table("t,u1,y1", DT, &[&u, &y]));
+    folder.text("simulation.csv", &table("t,u1,y1", DT, &[&u, &simulated]));
+    let arguments = [
+        "recording.csv",
+        "--simulation",
+        "simulation.csv",
+        "--output",
+    ];
+    let arguments = [&["explain"], &arguments[..], &["answer.json"]].concat();
+    folder.run(&arguments).ok();
+    let answer = json(&folder.join("answer.json"));
+    let features = answer["remaining"]["features"].as_u64().unwrap();
+    assert!((8..=50).contains(&features), "{}", answer["remaining"]);
+}
+
+#[test]
+fn simulations_without_dynamics() {
+    let folder = good();
+    let mut system = servo();
+    system.c *= 0.0;
+    system.d.fill(2.0);
+    folder.text("static.json", &model_json(&system));
+    says(
+        &about(&folder, &["recording.csv"], &["static.json"], &[]),
+        &["static.json: no output shows any state", "give a model"],
+    );
+}
+
 #[test]
 fn simulations_that_run_away() {
     let folder = good();

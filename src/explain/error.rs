@@ -110,6 +110,11 @@ pub enum ExplainError {
         states: usize,
         most: usize,
     },
+    /// A static simulation.
+    #[error(
+        "{name}: no output shows any state of this simulation, so there are no dynamics to explain; give a model with those of the plant"
+    )]
+    Static { name: String },
     /// An output that does not move.
     #[error(
         "{recording}: the output {output} is constant; leave it out with --outputs, or check the sensor"

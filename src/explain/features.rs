@@ -14,6 +14,9 @@ const HATS: usize = 8;
 const RATE_HATS: usize = 6;
 /// Blocks of time.
 const BLOCKS: usize = 8;
+/// Values that a feature needs, and features that make a test.
+const VALUES_A_FEATURE: usize = 4;
+const LEAST_FEATURES: usize = 8;
 /// Half widths of play, over the size of the signal.
 const PLAYS: [f64; 2] = [0.03, 0.2];
 
@@ -150,13 +153,18 @@ impl Bench<'_> {
 
     /// What `columns` explain of the residual beyond the free numbers.
     fn gain_of(&self, columns: &[Vec<f64>]) -> Option<(f64, f64, usize)> {
-        let count = columns.len();
         let rows = self.weights.len();
-        if count == 0 || rows < 4 * count {
+        // A short recording is asked about some of them, from all over.
+        let every = (VALUES_A_FEATURE * columns.len())
+            .div_ceil(rows.max(1))
+            .max(1);
+        let columns: Vec<&[f64]> = columns.iter().step_by(every).map(Vec::as_slice).collect();
+        let count = columns.len();
+        if count < LEAST_FEATURES {
             return None;
         }
         let mut before = Vec::with_capacity(count);
-        for column in columns {
+        for column in &columns {
             before.push(column.iter().map(|v| v * v).sum::<f64>().max(1e-300));
         }
         let columns = self.projected(&DMatrix::from_vec(rows, count, columns.concat()));

@@ -220,6 +220,11 @@ fn of_model(recordings: &[Log], model: &Model, name: &str) -> Result<Known, Expl
             }
         }
     }
+    if Coordinates::new(&plant).given.states == 0 {
+        return Err(ExplainError::Static {
+            name: name.to_owned(),
+        });
+    }
     trimmed(&mut data);
     let level = |list: &[crate::identify::IdentifiedChannel]| -> Vec<f64> {
         list.iter().map(|c| c.level).collect()
