@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use cli_support::{Folder, columns, json};
-use innovant::explain::Explanation;
+use innovant::explain::{ExplainError, Explanation, Options, Simulation, explain};
 use innovant::log::{Log, RoleNeed, Roles, Source};
 use innovant::report::{explanation_schema, parse_explanation};
 use rayon::prelude::*;
@@ -156,4 +156,42 @@ fn concealed_cases_are_answered() {
         .map(|s| s.case.as_str())
         .collect();
     assert!(wrong.len() <= CASES - RIGHT, "not right: {wrong:?}");
+}
+
+/// What is left out of the library is not named, and what is not in it cannot be left out.
+#[test]
+fn effects_that_are_left_out() {
+    let data = folder().join("case_003");
+    let source = Source::from(data.join("recording.csv"));
+    let recording = Log::read(&source, &Roles::default()).unwrap();
+    let simulation = ["simulation.csv", "simulation.json"]
+        .map(|name| data.join(name))
+        .into_iter()
+        .find(|path| path.exists())
+        .unwrap();
+    let scratch = Folder::new();
+    let arguments = [
+        &text(&data.join("recording.csv")),
+        "--simulation",
+        &text(&simulation),
+    ];
+    for (left_out, named) in [("quadratic_drag", true), ("cubic_stiffness", false)] {
+        let flags = ["--without", left_out, "--output", "explanation.json"];
+        scratch
+            .run(&[&["explain"], &arguments[..], &flags].concat())
+            .ok();
+        let document = json(&scratch.join("explanation.json"));
+        let effects = document["effects"].as_array().unwrap();
+        let found = effects.iter().any(|e| e["effect"] == "cubic_stiffness");
+        assert_eq!(found, named, "without {left_out}: {effects:?}");
+    }
+    let options = Options {
+        without: vec!["nothing".to_owned()],
+        ..Options::default()
+    };
+    let simulated = Simulation::Outputs(vec![recording.clone()]);
+    assert!(matches!(
+        explain(&[recording], &simulated, &options),
+        Err(ExplainError::UnknownEffect { id }) if id == "nothing"
+    ));
 }

@@ -253,6 +253,23 @@ mod tests {
         found
     }
 
+    /// The interval lies about the gain, as wide as its deviation and Student's quantile say.
+    #[test]
+    fn static_gains_have_intervals() {
+        let (system, covariance) = fixtures::two_by_three(true);
+        let quantile = interval_quantile(0.95, covariance.degrees_of_freedom);
+        assert!(quantile > 1.9);
+        let gain = system.static_gain().unwrap();
+        let found = all(&system, Some(&covariance), &[]).static_gain;
+        for (i, found) in found.iter().enumerate() {
+            let (value, std) = (found.value.unwrap(), found.standard_deviation.unwrap());
+            assert_eq!(value, gain[(i % 3, i / 3)]);
+            let [low, high] = found.interval_95.unwrap();
+            assert!((low + high - 2.0 * value).abs() < 1e-12 * value.abs());
+            assert!((high - low - 2.0 * quantile * std).abs() < 1e-9 * std && std > 0.0);
+        }
+    }
+
     #[test]
     fn every_channel_at_every_frequency() {
         let (system, covariance) = fixtures::two_by_three(true);

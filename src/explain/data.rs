@@ -88,3 +88,33 @@ pub(super) fn deviation<'a>(values: impl Iterator<Item = &'a f64> + Clone) -> f6
     let variance = values.map(|v| (v - mean).powi(2)).sum::<f64>() / n;
     if variance > 0.0 { variance.sqrt() } else { 1.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn deviations_are_about_the_mean_over_all_segments() {
+        let segment = |u: &[f64], y: &[f64]| Segment {
+            inputs: vec![u.to_vec()],
+            outputs: vec![y.to_vec()],
+            start_time: 0.0,
+        };
+        let data = Data {
+            segments: vec![
+                segment(&[1.0, 3.0], &[5.0, 5.0]),
+                segment(&[5.0, 7.0], &[5.0, 5.0]),
+            ],
+            sample_time: 1.0,
+            inputs: 1,
+            outputs: 1,
+            constant: false,
+        };
+        assert_eq!(data.samples(), 4);
+        assert!((data.input_scale()[0] - 5.0_f64.sqrt()).abs() < 1e-12);
+        // What does not vary is divided by one.
+        assert_eq!(data.output_scale(), [1.0]);
+        let simulated = vec![vec![1.0, 2.0], vec![3.0, 4.0]];
+        assert_eq!(data.residual(&simulated), [[4.0, 3.0], [2.0, 1.0]]);
+    }
+}

@@ -292,3 +292,52 @@ fn hat(v: f64, low: f64, centre: f64, high: f64) -> f64 {
         (high - v) / (high - centre)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hats_stand_over_the_quantiles() {
+        let values: Vec<f64> = (0..=100).map(f64::from).collect();
+        let found = hats(&values, 4);
+        let wanted = [
+            (0.0, 20.0, 40.0),
+            (20.0, 40.0, 60.0),
+            (40.0, 60.0, 80.0),
+            (60.0, 80.0, 100.0),
+        ];
+        assert_eq!(found, wanted);
+        // Between the outer tops they add up to one, and each is one at its own.
+        for v in [20.0, 33.0, 71.0, 80.0] {
+            let sum: f64 = found.iter().map(|(l, c, h)| hat(v, *l, *c, *h)).sum();
+            assert!((sum - 1.0).abs() < 1e-12, "{v}: {sum}");
+        }
+        assert_eq!(hat(30.0, 20.0, 40.0, 60.0), 0.5);
+        assert_eq!(hat(55.0, 20.0, 40.0, 60.0), 0.25);
+        assert_eq!(
+            [hat(20.0, 20.0, 40.0, 60.0), hat(60.0, 20.0, 40.0, 60.0)],
+            [0.0; 2]
+        );
+        // A value that is taken often makes fewer hats, and none without a width.
+        let mut often = values;
+        often.extend([50.0; 400]);
+        assert!(hats(&often, 4).iter().all(|(l, c, h)| l < c && c < h));
+    }
+
+    #[test]
+    fn play_is_carried_along() {
+        let x: Vec<f64> = (0..200).map(|k| (0.1 * f64::from(k)).sin()).collect();
+        let size = effects::level(&x, 0.8, f64::abs);
+        for (share, play) in PLAYS.into_iter().zip(plays(std::slice::from_ref(&x))) {
+            let gap = share * size;
+            for k in 1..x.len() {
+                let (held, before) = (play[0][k], play[0][k - 1]);
+                assert!((held - x[k]).abs() <= gap + 1e-12);
+                // Moves only where it is carried.
+                let carried = ((held - x[k]).abs() - gap).abs() < 1e-12;
+                assert!(held == before || carried, "{k}");
+            }
+        }
+    }
+}

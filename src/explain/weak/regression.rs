@@ -166,4 +166,42 @@ mod tests {
         let fit = Regression::new(&[&a, &one], &b).unwrap();
         assert!((fit.coefficients[0] - 2.0).abs() < 1e-12 && fit.coefficients[1].abs() < 1e-10);
     }
+
+    /// Coefficients scatter as their stated covariance says, whether the errors are independent or not.
+    #[test]
+    fn coefficients_are_as_certain_as_is_said() {
+        const RUNS: u64 = 200;
+        for correlated in [0.0, 0.8] {
+            let mut squares = [0.0; 2];
+            for seed in 0..RUNS {
+                let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+                let mut white = || random.random::<f64>() - 0.5;
+                let mut passed = [0.0; 2];
+                let mut coloured = |i: usize| {
+                    passed[i] = correlated * passed[i] + white();
+                    passed[i]
+                };
+                let a: Vec<f64> = (0..600).map(|_| coloured(0)).collect();
+                let one = vec![1.0; 600];
+                let target: Vec<f64> = a.iter().map(|a| 2.0 * a - 1.0 + coloured(1)).collect();
+                let fit = Regression::new(&[&a, &one], &target).unwrap();
+                let covariance = fit.covariance();
+                for (i, truth) in [2.0, -1.0].into_iter().enumerate() {
+                    let error = fit.coefficients[i] - truth;
+                    squares[i] += error * error / covariance[(i, i)] / RUNS as f64;
+                }
+            }
+            // Bartlett's count is that of a slope whose regressor is as slow as the errors; a mean of such errors
+            // scatters more, by (1 + rho)^2/(1 + rho^2) at most.
+            let slow = (1.0 + correlated).powi(2) / (1.0 + correlated * correlated);
+            assert!(
+                (0.7..1.4).contains(&squares[0]),
+                "{correlated}: {squares:?}"
+            );
+            assert!(
+                (0.7..1.4 * slow).contains(&squares[1]),
+                "{correlated}: {squares:?}"
+            );
+        }
+    }
 }
