@@ -21,6 +21,9 @@ const STEP_SHARE: f64 = 1e-5;
 const SMALLEST_STEP: f64 = 1e-30;
 const LARGEST_STEP: f64 = 1e30;
 
+/// Steps that are tried for a secant, each a third of the one before: down to 1e-7 of the number.
+const SECANTS: usize = 14;
+
 /// How hard a fit tries.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
@@ -350,9 +353,59 @@ impl Fit {
         None
     }
 
+    /// Change of the simulation per number `i` over a step about as large as the number is uncertain. Small steps do not
+    /// tell where a law sticks or slips: the outputs jump where it decides otherwise.
+    fn secant(&self, problem: &Problem, i: usize) -> Option<Series> {
+        let upper_bound = self.structure.bounds()[i].1;
+        // What a standard deviation of one number moves.
+        let wanted = (problem.mean_square(&self.residual) / problem.count().max(1) as f64).sqrt();
+        let mut step = 0.3 * self.theta[i].abs().max(self.steps[i]);
+        let mut last: Option<(f64, Series)> = None;
+        for _ in 0..SECANTS {
+            let mut moved = self.theta.clone();
+            let made = if moved[i] + step > upper_bound {
+                -step
+            } else {
+                step
+            };
+            moved[i] += made;
+            step /= 3.0;
+            let Some(simulated) = self.structure.simulate(&moved, problem.data) else {
+                continue;
+            };
+            let mut change = difference(&simulated, &self.simulated);
+            let size = problem.size(&change);
+            if size == 0.0 {
+                break;
+            }
+            // A third of the step that moves as much as before is one of those jumps.
+            if last.as_ref().is_some_and(|(before, _)| size > 0.6 * before) {
+                break;
+            }
+            for value in change.iter_mut().flatten() {
+                *value /= made;
+            }
+            last = Some((size, change));
+            if size <= wanted {
+                break;
+            }
+        }
+        last.map(|(_, slope)| slope)
+    }
+
     /// Whitened derivatives of the values that count.
     fn jacobian(&mut self, problem: &Problem, noise: &Noise) -> Option<Jacobian> {
         let columns = self.sensitivities(problem);
+        self.whitened(problem, noise, &columns)
+    }
+
+    /// Whitened `columns`, one a number, of the values that count.
+    fn whitened(
+        &self,
+        problem: &Problem,
+        noise: &Noise,
+        columns: &[Option<Series>],
+    ) -> Option<Jacobian> {
         let rows: usize = problem.count();
         let used: Vec<usize> = (0..columns.len())
             .filter(|i| columns[*i].is_some())
@@ -376,7 +429,13 @@ impl Fit {
     /// How well the numbers are known.
     pub fn certainty(&mut self, problem: &Problem) -> Option<Certainty> {
         let noise = self.noise.clone();
-        let jacobian = self.jacobian(problem, &noise)?;
+        let mut columns = self.sensitivities(problem);
+        for (i, column) in columns.iter_mut().enumerate() {
+            if column.is_none() {
+                *column = self.secant(problem, i);
+            }
+        }
+        let jacobian = self.whitened(problem, &noise, &columns)?;
         let first: Vec<bool> = problem
             .mask
             .iter()

@@ -15,6 +15,11 @@ const NOISE: f64 = 0.05;
 
 /// A mass on a spring that stiffens.
 fn structure() -> Structure {
+    with_force("cubic_stiffness")
+}
+
+/// A mass on a spring, and a force.
+fn with_force(id: &str) -> Structure {
     let plant = Plant {
         states: 2,
         inputs: 1,
@@ -33,7 +38,7 @@ fn structure() -> Structure {
         feedthrough_free: false,
         substeps: 1,
         effects: vec![Instance {
-            definition: effects::find("cubic_stiffness", "").unwrap(),
+            definition: effects::find(id, "").unwrap(),
             channel: 0,
             signal: Signal::Output(0),
             direction: Direction::Matched(0),
@@ -50,6 +55,10 @@ fn truth() -> Vec<f64> {
 }
 
 fn recording(seed: u64) -> Data {
+    recorded(&structure(), &truth(), seed)
+}
+
+fn recorded(structure: &Structure, truth: &[f64], seed: u64) -> Data {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut normal = || -> f64 { random.sample(StandardNormal) };
     let mut data = Data {
@@ -63,7 +72,7 @@ fn recording(seed: u64) -> Data {
         outputs: 1,
         constant: false,
     };
-    let mut y = structure().simulate(&truth(), &data).unwrap();
+    let mut y = structure.simulate(truth, &data).unwrap();
     y[0].iter_mut().for_each(|y| *y += NOISE * normal());
     data.segments[0].outputs = y;
     data
@@ -121,6 +130,50 @@ fn numbers_are_as_certain_as_is_said() {
         for mean in [squares, apart].map(|sum| sum / f64::from(runs)) {
             assert!((0.4..1.7).contains(&mean), "number {i}: {mean}");
         }
+    }
+}
+
+/// Dry friction sticks and slips, so that the outputs jump with its force; how certain that is is said nevertheless.
+#[test]
+fn dry_friction_is_as_certain_as_is_said() {
+    const RUNS: u64 = 60;
+    let mut structure = with_force("coulomb_friction");
+    structure.plant_free = false;
+    structure.effects[0].direction = Direction::Free;
+    // Through the speed, and hardly through the position.
+    let truth = [0.002, 0.05];
+    let squares: Vec<[f64; 2]> = (0..RUNS)
+        .into_par_iter()
+        .map(|seed| {
+            let data = recorded(&structure, &truth, 500 + seed);
+            let problem = Problem::new(&data);
+            let start = vec![0.0, 0.04];
+            let mut fit =
+                Fit::run(&problem, structure.clone(), start, None, Effort::FINAL).unwrap();
+            let covariance = fit.certainty(&problem).unwrap().covariance;
+            [0, 1].map(|i| {
+                assert!(covariance[(i, i)] > 0.0);
+                (fit.theta[i] - truth[i]).powi(2) / covariance[(i, i)]
+            })
+        })
+        .collect();
+    for i in 0..2 {
+        let mut each: Vec<f64> = squares.iter().map(|s| s[i]).collect();
+        each.sort_by(f64::total_cmp);
+        let within = each.iter().filter(|s| **s < 4.0).count();
+        println!(
+            "number {i}: {within} of {RUNS} within two deviations, median square {:.2}",
+            each[30]
+        );
+        assert!(
+            within >= 45,
+            "number {i}: {within} of {RUNS} within two deviations"
+        );
+        assert!(
+            (0.1..1.5).contains(&each[30]),
+            "number {i}: median square {}",
+            each[30]
+        );
     }
 }
 

@@ -74,15 +74,16 @@ fn written_out(
     let mut x = x0.to_vec();
     let mut outputs = vec![Vec::new(); plant.outputs];
     for k in 0..inputs[0].len() {
+        let u: Vec<f64> = inputs.iter().map(|u| u[k]).collect();
         for (o, y) in outputs.iter_mut().enumerate() {
             let state: f64 = (0..n).map(|i| plant.c[o * n + i] * x[i]).sum();
-            let direct: f64 = (0..r).map(|j| plant.d[o * r + j] * inputs[j][k]).sum();
+            let direct: f64 = (0..r).map(|j| plant.d[o * r + j] * u[j]).sum();
             y.push(state + direct);
         }
         let free: Vec<f64> = (0..n)
             .map(|i| {
                 let state: f64 = (0..n).map(|j| plant.a[i * n + j] * x[j]).sum();
-                let input: f64 = (0..r).map(|j| plant.b[i * r + j] * inputs[j][k]).sum();
+                let input: f64 = (0..r).map(|j| plant.b[i * r + j] * u[j]).sum();
                 state + input
             })
             .collect();
