@@ -88,6 +88,15 @@ fn ask(case: &str, validator: &jsonschema::Validator) -> Said {
             .map(|v| key.map_or(v, |k| &v[k]).as_str().unwrap().to_owned())
             .collect()
     };
+    for effect in document["effects"].as_array().unwrap() {
+        let (signal, sentence) = (&effect["signal"], &effect["sentence"]);
+        let (signal, sentence) = (signal.as_str().unwrap(), sentence.as_str().unwrap());
+        assert!(
+            ["u1", "u2", "y1", "y2"].contains(&signal),
+            "{case}: {signal}"
+        );
+        assert!(sentence.contains(signal), "{case}: {sentence}");
+    }
     let named = ids(&document["effects"], Some("effect"));
     let real = ids(&truth["effects"], None);
     let sorted = |mut list: Vec<String>| {

@@ -40,6 +40,8 @@ mod explanation;
 mod features;
 mod finer;
 mod fit;
+#[cfg(test)]
+mod fixtures;
 mod functionals;
 mod inquiry;
 mod locate;

@@ -1,5 +1,8 @@
 //! Physics that contradicts itself, and effects that only make up for wrong parameters.
 
+#[cfg(test)]
+mod tests;
+
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 

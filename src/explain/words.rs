@@ -43,6 +43,9 @@ pub(crate) fn number(value: f64) -> String {
     }
 }
 
+/// An uncertainty so many times its value says that the recording hardly determines it.
+const HARDLY: f64 = 10.0;
+
 /// `0.42 +- 0.03 N`.
 pub(crate) fn quantity(q: &Quantity) -> String {
     let unit = if q.unit.is_empty() {
@@ -51,7 +54,7 @@ pub(crate) fn quantity(q: &Quantity) -> String {
         format!(" {}", q.unit)
     };
     match q.std {
-        Some(std) if std > 0.0 && std < 10.0 * q.value.abs().max(1e-300) => {
+        Some(std) if std > 0.0 && std < HARDLY * q.value.abs().max(1e-300) => {
             let digits = (1 - std.log10().floor() as i32).clamp(0, 9) as usize;
             if (1e-4..1e6).contains(&q.value.abs()) {
                 format!("{:.digits$} +- {std:.digits$}{unit}", q.value)
@@ -59,6 +62,11 @@ pub(crate) fn quantity(q: &Quantity) -> String {
                 format!("{} +- {std:.1e}{unit}", number(q.value))
             }
         }
+        Some(std) if std > 0.0 => format!(
+            "{}{unit} (hardly determined: +- {}{unit})",
+            number(q.value),
+            number(std)
+        ),
         _ => format!("{}{unit}", number(q.value)),
     }
 }
@@ -236,4 +244,28 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
         ));
     }
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantities_say_how_certain_they_are() {
+        let said = |value: f64, std: Option<f64>| {
+            quantity(&Quantity {
+                value,
+                std,
+                unit: "s".to_owned(),
+            })
+        };
+        assert_eq!(said(0.4213, Some(0.031)), "0.421 +- 0.031 s");
+        assert_eq!(said(-12.0, Some(3.0)), "-12.0 +- 3.0 s");
+        assert_eq!(said(2.5e-7, Some(1e-8)), "2.500e-7 +- 1.0e-8 s");
+        assert_eq!(
+            said(0.5548, Some(28.0)),
+            "0.5548 s (hardly determined: +- 28.00 s)"
+        );
+        assert_eq!(said(0.5548, None), "0.5548 s");
+    }
 }

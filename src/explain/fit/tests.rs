@@ -1,50 +1,12 @@
-use std::sync::Arc;
-
 use super::*;
-use crate::explain::coordinates::Coordinates;
-use crate::explain::data::Segment;
-use crate::explain::effects;
-use crate::explain::plant::Plant;
-use crate::explain::structure::{Direction, Instance, Signal};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
+use crate::explain::fixtures::{SAMPLES as N, effect, recorded, spring};
+use crate::explain::structure::Direction;
 
-const N: usize = 800;
-const NOISE: f64 = 0.05;
-
-/// A mass on a spring that stiffens.
+/// A mass on a spring that stiffens, all its numbers free.
 fn structure() -> Structure {
-    with_force("cubic_stiffness")
-}
-
-/// A mass on a spring, and a force.
-fn with_force(id: &str) -> Structure {
-    let plant = Plant {
-        states: 2,
-        inputs: 1,
-        outputs: 1,
-        a: vec![0.95, 0.09, -0.9, 0.85],
-        b: vec![0.005, 0.09],
-        c: vec![1.0, 0.0],
-        d: vec![0.0],
-        sample_time: 0.1,
-    };
     Structure {
-        coordinates: Arc::new(Coordinates::new(&plant)),
         plant_free: true,
-        initial_free: false,
-        initial: vec![vec![0.0; 2]],
-        feedthrough_free: false,
-        substeps: 1,
-        effects: vec![Instance {
-            definition: effects::find(id, "").unwrap(),
-            channel: 0,
-            signal: Signal::Output(0),
-            direction: Direction::Matched(0),
-        }],
-        known: Vec::new(),
-        adjusted: 0,
+        ..spring(vec![effect("cubic_stiffness", "")])
     }
 }
 
@@ -56,26 +18,6 @@ fn truth() -> Vec<f64> {
 
 fn recording(seed: u64) -> Data {
     recorded(&structure(), &truth(), seed)
-}
-
-fn recorded(structure: &Structure, truth: &[f64], seed: u64) -> Data {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut normal = || -> f64 { random.sample(StandardNormal) };
-    let mut data = Data {
-        segments: vec![Segment {
-            inputs: vec![(0..N).map(|_| 2.0 * normal()).collect()],
-            outputs: vec![vec![0.0; N]],
-            start_time: 0.0,
-        }],
-        sample_time: 0.1,
-        inputs: 1,
-        outputs: 1,
-        constant: false,
-    };
-    let mut y = structure.simulate(truth, &data).unwrap();
-    y[0].iter_mut().for_each(|y| *y += NOISE * normal());
-    data.segments[0].outputs = y;
-    data
 }
 
 #[test]
@@ -137,8 +79,7 @@ fn numbers_are_as_certain_as_is_said() {
 #[test]
 fn dry_friction_is_as_certain_as_is_said() {
     const RUNS: u64 = 60;
-    let mut structure = with_force("coulomb_friction");
-    structure.plant_free = false;
+    let mut structure = spring(vec![effect("coulomb_friction", "")]);
     structure.effects[0].direction = Direction::Free;
     // Through the speed, and hardly through the position.
     let truth = [0.002, 0.05];
