@@ -14,16 +14,22 @@ use innovant::report::{is_explanation, parse_explanation, parse_model};
 use innovant::systems::{servo, two_by_two};
 use innovant::{IdentifyError, identify};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use serde_json::{Value, json};
 
 fn bytes(most: usize) -> impl Strategy<Value = Vec<u8>> {
     prop::collection::vec(any::<u8>(), 0..most)
 }
 
-/// What fails is written below as a test with a name, and not into a file of seeds.
+/// What fails is written below as a test with a name, and not into a file of seeds. The same bytes in every run: a search is what
+/// `fuzz/run.sh` is for, or `PROPTEST_RNG_SEED` with another number.
 fn config(cases: u32) -> ProptestConfig {
     ProptestConfig {
         cases,
+        rng_seed: match std::env::var("PROPTEST_RNG_SEED") {
+            Ok(seed) => seed.parse().expect("PROPTEST_RNG_SEED is a number"),
+            Err(_) => RngSeed::Fixed(6),
+        },
         failure_persistence: None,
         ..ProptestConfig::default()
     }
