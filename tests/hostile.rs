@@ -347,3 +347,11 @@ fn states_that_no_output_sees_are_left_out() {
         "hostile/found/explain_states_that_no_output_sees"
     ));
 }
+
+/// A model came with a covariance that was beyond the range of numbers.
+#[test]
+fn a_covariance_beyond_the_range_is_refused() {
+    hostile::identify(include_bytes!(
+        "hostile/found/identify_covariance_beyond_the_range"
+    ));
+}

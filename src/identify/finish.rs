@@ -248,9 +248,16 @@ pub fn finish(
     }
     let poles = pole_uncertainties(&system, &covariance).unwrap_or_default();
     summary.warnings.extend(warnings::of_poles(&poles));
+    let covariance = scaling::covariance_in_user_units(&covariance, &data.scale);
+    // What the recording hardly determines, in units far apart, may lie beyond any number.
+    if !covariance.matrix.iter().all(|v| v.is_finite()) {
+        return Err(IdentifyError::SingularRegression {
+            what: "the states and inputs",
+        });
+    }
     Ok(Fit {
         system: scaling::system_in_user_units(&system, &data.scale),
-        covariance: scaling::covariance_in_user_units(&covariance, &data.scale),
+        covariance,
         innovation_covariance: scaling::innovation_in_user_units(
             &innovation_covariance,
             &data.scale[factor.inputs..],
