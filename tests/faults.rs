@@ -390,7 +390,7 @@ fn an_input_that_changes_is_told_from_one_that_does_not() {
     folder.recording("log.csv", &system, 20_000, 1);
     let whole = folder.run(&["identify", "log.csv", "--output", "-"]).json();
 
-    // A logger goes on writing: the recording is what was there when it was opened.
+    // A logger goes on writing: the recording is the whole lines that were there when it was opened.
     let text = fs::read(folder.join("log.csv")).unwrap();
     let lines: Vec<&[u8]> = text.split_inclusive(|byte| *byte == b'\n').collect();
     folder.bytes("grows.csv", &lines[..15_001].concat());
@@ -399,12 +399,14 @@ fn an_input_that_changes_is_told_from_one_that_does_not() {
         .open(folder.join("grows.csv"))
         .unwrap();
     let mut command = innovant(&folder, &["identify", "grows.csv", "--output", "-"]);
-    let child = command.stdout(Stdio::piped()).spawn().unwrap();
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let child = command.spawn().unwrap();
     for line in &lines[15_001..] {
         growing.write_all(line).unwrap();
     }
     let run = child.wait_with_output().unwrap();
-    assert!(run.status.success());
+    let stderr = String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success(), "{stderr}");
     let model: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
     let samples = model["samples"].as_u64().unwrap();
     assert!(

@@ -11,7 +11,8 @@ const CHUNK: usize = 256 * 1024;
 const LONGEST: usize = 1 << 20;
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 
-/// A stream cut at line ends. Every line comes with its `\n`: the last gets one if the file does not end in one.
+/// A stream cut at line ends. Every line comes with its `\n`: the last gets one if the file does not end in one, and is
+/// left out if it is still being written.
 pub(super) struct Lines {
     name: String,
     stream: Stream,
@@ -114,7 +115,12 @@ impl Lines {
             }
             if self.ended && self.end > self.start {
                 self.cut_off = self.buffer.get(self.end - 1) != Some(&b'\n');
-                if self.cut_off {
+                if self.cut_off && self.stream.has_grown() {
+                    // The writer was in the middle of this line when the file was opened: what is there of it may be half
+                    // a number. All before it was given out, for a refill starts where no whole line is left.
+                    self.cut_off = false;
+                    self.end = self.start;
+                } else if self.cut_off {
                     self.buffer.truncate(self.end);
                     self.buffer.push(b'\n');
                     self.end += 1;

@@ -92,7 +92,12 @@ impl Source {
                     // A file that is being written to is read as far as it went when it was opened. (Files that say
                     // they are empty may be made while they are read, as those of /proc.)
                     Some(size) if size > 0 => {
-                        Stream::new(Box::new(file.take(size)), gzip, Some(size))
+                        let again = file.try_clone().map_err(failed)?;
+                        let stream = Stream::new(Box::new(file.take(size)), gzip, Some(size));
+                        stream.map(|stream| Stream {
+                            file: Some(again),
+                            ..stream
+                        })
                     }
                     _ => Stream::new(Box::new(file), gzip, None),
                 }
@@ -127,6 +132,8 @@ enum Decoder {
 pub(super) struct Stream {
     decoder: Decoder,
     size: Option<u64>,
+    /// The file that is read, when it is one, to ask about its size.
+    file: Option<File>,
 }
 
 impl Stream {
@@ -150,7 +157,11 @@ impl Stream {
         } else {
             Decoder::Plain(witness)
         };
-        Ok(Self { decoder, size })
+        Ok(Self {
+            decoder,
+            size,
+            file: None,
+        })
     }
 
     pub(super) fn is_gzip(&self) -> bool {
@@ -168,6 +179,12 @@ impl Stream {
     /// Raw bytes in all, when the source is a file.
     pub(super) fn bytes_total(&self) -> Option<u64> {
         self.size
+    }
+
+    /// Whether the file is longer than when it was opened: someone is writing to it.
+    pub(super) fn has_grown(&self) -> bool {
+        let length = self.file.as_ref().and_then(|file| file.metadata().ok());
+        length.is_some_and(|about| Some(about.len()) > self.size)
     }
 
     /// SHA-256 (hexadecimal) and number of the raw bytes read.

@@ -1,6 +1,6 @@
 //! What is accepted, and that it is the same however it comes.
 
-use std::io::Cursor;
+use std::io::{Cursor, Write};
 
 use proptest::prelude::*;
 
@@ -214,6 +214,34 @@ fn the_summary_is_of_the_raw_bytes() {
         .map(|byte| format!("{byte:02x}"))
         .collect();
     assert_eq!(summary.sha256, expected);
+}
+
+/// A buffered logger writes blocks that end anywhere, also within a number of the last column.
+#[test]
+fn a_line_that_is_still_being_written_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let long = long_csv(100_000);
+    for (text, cut) in [(PLAIN, 1), (PLAIN, 2), (PLAIN, 4), (&long, 3), (&long, 1)] {
+        let path = folder.path().join("log.csv");
+        std::fs::write(&path, &text[..text.len() - cut]).unwrap();
+        let open = || {
+            let source = Source::Path(path.clone());
+            LogReader::open(&source, &Roles::default(), RoleNeed::Identify).unwrap()
+        };
+        let whole = text.lines().count() - 1;
+        // Nobody writes: the line is taken for whole if it can be one.
+        let left = open().finish().map(|summary| summary.samples);
+        assert!(left.is_err() || left.unwrap() == whole);
+        let reader = open();
+        let mut file = std::fs::File::options().append(true).open(&path).unwrap();
+        let rest = format!("{}3,1,1\n4,", &text[text.len() - cut..]);
+        file.write_all(rest.as_bytes()).unwrap();
+        let summary = reader.finish().unwrap();
+        assert_eq!(
+            (summary.samples, summary.bytes),
+            (whole - 1, (text.len() - cut) as u64)
+        );
+    }
 }
 
 #[test]
