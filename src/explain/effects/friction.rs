@@ -1,5 +1,6 @@
 //! Forces that dissipate: dry friction with and without a breakaway force, drag.
 
+use super::lambert::exponential_w;
 use super::{
     Action, Definition, Mimic, Motion, Needs, Observed, Parameter, Sense, Unit, decay, level,
 };
@@ -169,8 +170,6 @@ pub(super) static ENTRIES: &[Definition] = &[
 
 /// Steps of the search for the force of a smooth knee; three are typical, halving alone reaches 1e-12.
 const KNEE_STEPS: usize = 40;
-/// The same for the force of bristles; two are typical, halving alone reaches 1e-8.
-const BRISTLE_STEPS: usize = 30;
 
 fn no_shape(_: &Observed) -> Vec<Vec<f64>> {
     vec![vec![]]
@@ -237,8 +236,8 @@ fn damped_breakaway_bristle(p: &[f64], motion: &Motion, memory: &mut [f64; 3]) -
 ///
 /// The deflection follows the position exactly (its law integrates in closed form over a monotone move), at the
 /// position in the middle of the interval that the force brings about itself: stiff bristles would be unstable
-/// otherwise. Memory: deflection in units of the largest, the position it was last updated at, and the
-/// last force.
+/// otherwise. With `x` the move in that time in units of `distance`, along itself, this is `x = c + a exp(-x)`, which
+/// Lambert's W solves. Memory: deflection in units of the largest, and the position it was last updated at.
 fn bristle_force(
     strength: f64,
     distance: f64,
@@ -249,42 +248,27 @@ fn bristle_force(
     if motion.sample == 0 {
         memory[1] = motion.position;
     }
-    let (before, from, last) = (memory[0], memory[1], memory[2]);
+    let (before, from) = (memory[0], memory[1]);
     let free = motion.middle();
     let damping = time / motion.clock.step;
     let gain = (0.5 * motion.position_gain * strength).max(0.0);
-    // force(free - gain f) - f falls monotonically with f: Newton's steps from the last force, within a bracket that
-    // shrinks, since bristles that are shorter than what their force moves in a step saturate on either side.
-    let most = 1.0 + 2.0 * damping;
-    let (mut low, mut high) = (-most, most);
-    let mut f = last.clamp(low, high);
-    for _ in 0..BRISTLE_STEPS {
-        let moved = free - gain * f - from;
-        let side = moved.signum();
-        let z = side - (side - before) * decay(moved.abs() / distance);
-        let excess = z + damping * (z - before) - f;
-        if excess > 0.0 {
-            low = f;
-        } else {
-            high = f;
-        }
-        let slope = 1.0 + gain * (1.0 + damping) * (1.0 - side * z) / distance;
-        let next = f + excess / slope;
-        let next = if next >= low && next <= high {
-            next
-        } else {
-            0.5 * (low + high)
-        };
-        let settled = (next - f).abs() < 1e-5;
-        f = next;
-        if settled {
-            break;
-        }
-    }
-    // The deflection that makes this force; the position is too rough where the bristles are short.
-    let z = (f + damping * before) / (1.0 + damping);
-    *memory = [z.clamp(-1.0, 1.0), free - gain * f, f];
-    -strength * f
+    // It moves to the side that is left when the bristles hold on with the force they have.
+    let side = (free - from - gain * before).signum();
+    let (before, free_move) = (side * before, side * (free - from));
+    // Share of the way to the saturated force that is left.
+    let slack = 1.0 - before;
+    let held = gain * (1.0 + damping) * slack / distance;
+    let base = (free_move - gain * before) / distance - held;
+    let (moved, left) = if held > 0.0 {
+        let shrunk = exponential_w(held.ln() - base);
+        (base + shrunk, shrunk / held)
+    } else {
+        (base, decay(base))
+    };
+    let z = (1.0 - slack * left).clamp(-1.0, 1.0);
+    let f = z + damping * (z - before);
+    *memory = [side * z, from + side * distance * moved, 0.0];
+    -strength * side * f
 }
 
 fn stribeck(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {

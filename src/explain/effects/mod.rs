@@ -8,6 +8,7 @@ mod actuator;
 mod change;
 mod disturbance;
 mod friction;
+mod lambert;
 mod law;
 mod linear;
 mod process;

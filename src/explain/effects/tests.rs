@@ -474,32 +474,44 @@ fn bristles_yield_as_dahl_says() {
 /// Stiff bristles that hold what they act on: the force is the one at the position that it brings about.
 #[test]
 fn bristles_are_met_by_the_position_that_they_leave() {
-    for (gain, distance) in [(0.0, 0.02), (0.01, 0.1), (1.0, 1e-3), (50.0, 1e-4)] {
-        for (before, last, free) in [(0.0, 0.0, 0.21), (0.9, 0.9, -0.3), (-1.0, 0.5, 0.2001)] {
+    for (gain, distance, time) in [
+        (0.0, 0.02, 0.0),
+        (0.01, 0.1, 0.04),
+        (1.0, 1e-3, 0.0),
+        (1.0, 1e-3, 0.2),
+        (50.0, 1e-4, 0.01),
+    ] {
+        for (before, free) in [(0.0, 0.21), (0.9, -0.3), (-1.0, 0.2001), (1.0, 0.3)] {
             let x = 0.2;
             let moving = motion(3, [x, 0.0], [free, 0.0], [gain, 0.0]);
-            let mut memory = [before, x, last];
-            let f = -force("coulomb_friction", "presliding")(&[distance], &moving, &mut memory);
+            let mut memory = [before, x, 0.0];
+            let f = -force("coulomb_friction", "bristles")(&[distance, time], &moving, &mut memory);
             let middle = |f: f64| 0.5 * (x + free) - 0.5 * gain * f;
+            let damping = time / STEP;
             let deflection = |f: f64| {
                 let moved = middle(f) - x;
                 let side = moved.signum();
                 side - (side - before) * (-moved.abs() / distance).exp()
             };
+            let bristle = |f: f64| deflection(f) + damping * (deflection(f) - before);
             // More force leaves less deflection.
-            let (mut low, mut high) = (-1.0, 1.0);
-            for _ in 0..60 {
+            let most = 1.0 + 2.0 * damping;
+            let (mut low, mut high) = (-most, most);
+            for _ in 0..70 {
                 let half = 0.5 * (low + high);
-                if deflection(half) > half {
+                if bristle(half) > half {
                     low = half;
                 } else {
                     high = half;
                 }
             }
-            assert_abs_diff_eq!(f, low, epsilon = 1e-5);
-            assert_abs_diff_eq!(memory[0], low, epsilon = 1e-5);
+            assert_abs_diff_eq!(f, low, epsilon = 1e-12 * most);
+            assert_abs_diff_eq!(
+                memory[0],
+                (low + damping * before) / (1.0 + damping),
+                epsilon = 1e-12
+            );
             assert_abs_diff_eq!(memory[1], middle(f), epsilon = 1e-12);
-            assert_abs_diff_eq!(memory[2], f, epsilon = 1e-12);
         }
     }
 }

@@ -1,4 +1,8 @@
+use rayon::prelude::*;
+
+use super::certainty::Certainty;
 use super::*;
+use crate::explain::data::difference;
 use crate::explain::fixtures::{SAMPLES as N, effect, recorded, spring};
 use crate::explain::structure::Direction;
 

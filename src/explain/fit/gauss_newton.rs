@@ -1,0 +1,157 @@
+//! Whitened derivatives, and the weighted least-squares system that they make.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::Problem;
+use crate::explain::data::{Series, difference};
+use crate::explain::noise::{Noise, extend_with_kept, kept};
+use crate::linalg::multiply_tn;
+
+/// Added to a curvature of one: numbers that do the same are held to the smallest change that does it.
+const RIDGE: f64 = 1e-12;
+
+/// Whitened derivatives of the values that count, a column a number that moves anything.
+pub(super) struct Jacobian {
+    columns: DMatrix<f64>,
+    used: Vec<usize>,
+    total: usize,
+}
+
+impl Jacobian {
+    /// Of `slopes`, a series a number; none when no number moves anything.
+    pub fn new(problem: &Problem, noise: &Noise, slopes: &[Option<Series>]) -> Option<Self> {
+        let rows = problem.count();
+        let used: Vec<usize> = (0..slopes.len()).filter(|i| slopes[*i].is_some()).collect();
+        if used.is_empty() {
+            return None;
+        }
+        let mut flat = Vec::with_capacity(rows * used.len());
+        for slope in slopes.iter().flatten() {
+            for (series, mask) in noise.whiten(slope).iter().zip(&problem.mask) {
+                extend_with_kept(&mut flat, series, mask);
+            }
+        }
+        flat.iter().all(|v| v.is_finite()).then(|| Self {
+            columns: DMatrix::from_vec(rows, used.len(), flat),
+            used,
+            total: slopes.len(),
+        })
+    }
+
+    /// Broyden's (1965) least change, each number on the scale of its own column, after which the derivatives foretell
+    /// what `step` has just done.
+    pub fn update(
+        &mut self,
+        problem: &Problem,
+        noise: &Noise,
+        step: &DVector<f64>,
+        before: &Series,
+        after: &Series,
+    ) {
+        let change = difference(after, before);
+        let missed = kept(&noise.whiten(&change), &problem.mask);
+        let step = DVector::from_iterator(self.used.len(), self.used.iter().map(|i| step[*i]));
+        let missed = DVector::from_vec(missed) - &self.columns * &step;
+        let along: Vec<f64> = self
+            .columns
+            .column_iter()
+            .zip(step.iter())
+            .map(|(column, s)| column.norm_squared() * s)
+            .collect();
+        let length: f64 = along.iter().zip(step.iter()).map(|(a, s)| a * s).sum();
+        if length > 0.0 && length.is_finite() {
+            for (mut column, a) in self.columns.column_iter_mut().zip(along) {
+                column.axpy(a / length, &missed, 1.0);
+            }
+        }
+    }
+
+    /// The weighted least-squares system at `residual`, of all rows or of those that `only` lets pass.
+    pub fn normal_equations(
+        &self,
+        problem: &Problem,
+        noise: &Noise,
+        residual: &Series,
+        only: Option<&[bool]>,
+    ) -> NormalEquations {
+        let rows = self.columns.nrows();
+        let e = kept(&noise.whiten(residual), &problem.mask);
+        let mut weights: Vec<f64> = e.iter().map(|e| noise.weight(*e)).collect();
+        for (weight, pass) in weights.iter_mut().zip(only.unwrap_or_default()) {
+            if !pass {
+                *weight = 0.0;
+            }
+        }
+        let target = DVector::from_iterator(rows, e.iter().zip(&weights).map(|(e, w)| e * w));
+        let mut curvature = if noise.degrees.is_finite() || only.is_some() {
+            let mut weighted = self.columns.clone();
+            for mut column in weighted.column_iter_mut() {
+                for (v, w) in column.iter_mut().zip(&weights) {
+                    *v *= w;
+                }
+            }
+            multiply_tn(&self.columns, &weighted)
+        } else {
+            multiply_tn(&self.columns, &self.columns)
+        };
+        let mut gradient = self.columns.tr_mul(&target);
+        let m = self.used.len();
+        let scale: Vec<f64> = (0..m)
+            .map(|i| curvature[(i, i)].sqrt().max(1e-300))
+            .collect();
+        for i in 0..m {
+            for j in 0..m {
+                curvature[(i, j)] /= scale[i] * scale[j];
+            }
+            gradient[i] /= scale[i];
+        }
+        NormalEquations {
+            curvature,
+            gradient,
+            scale,
+            used: self.used.clone(),
+            total: self.total,
+        }
+    }
+}
+
+/// Each number is in units of its own curvature, whose diagonal is therefore one.
+pub(super) struct NormalEquations {
+    curvature: DMatrix<f64>,
+    gradient: DVector<f64>,
+    scale: Vec<f64>,
+    used: Vec<usize>,
+    total: usize,
+}
+
+impl NormalEquations {
+    fn factor(&self, damping: f64) -> Option<Cholesky<f64, Dyn>> {
+        let mut damped = self.curvature.clone();
+        for i in 0..self.used.len() {
+            damped[(i, i)] += damping + RIDGE;
+        }
+        damped.cholesky()
+    }
+
+    /// Inverse of the curvature, for all numbers.
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        let inverse = self.factor(0.0)?.inverse();
+        let mut covariance = DMatrix::zeros(self.total, self.total);
+        for (i, &a) in self.used.iter().enumerate() {
+            for (j, &b) in self.used.iter().enumerate() {
+                covariance[(a, b)] = inverse[(i, j)] / (self.scale[i] * self.scale[j]);
+            }
+        }
+        Some(covariance)
+    }
+
+    /// The damped step.
+    pub fn step(&self, damping: f64) -> Option<DVector<f64>> {
+        let solved = self.factor(damping)?.solve(&self.gradient);
+        let mut step = DVector::zeros(self.total);
+        for (i, &at) in self.used.iter().enumerate() {
+            step[at] = solved[i] / self.scale[i];
+        }
+        step.iter().all(|v| v.is_finite()).then_some(step)
+    }
+}
