@@ -8,7 +8,7 @@ use super::output::{Output, check_distinct, note, paths, print};
 use super::roles::RoleFlags;
 use super::{Outcome, Verbosity};
 use crate::explain::{Explanation, Options, Simulation, Verdict, explain};
-use crate::log::{Log, RoleNeed, Roles, Source, check_same_channels, check_same_sampling};
+use crate::log::{Log, RoleNeed, Roles, Source};
 use crate::report::text::explanation_text;
 use crate::report::{explanation_page, read_model, to_json};
 
@@ -71,15 +71,7 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     for source in &flags.logs {
         let log = Log::read(source, &roles)?;
         if let Some(first) = logs.first() {
-            check_same_channels(&first.name, &first.inputs, &log.name, &log.inputs, "inputs")?;
-            check_same_channels(
-                &first.name,
-                &first.outputs,
-                &log.name,
-                &log.outputs,
-                "outputs",
-            )?;
-            check_same_sampling(&first.name, first.sample_time, &log.name, log.sample_time)?;
+            first.check_same_kind(&log)?;
         }
         logs.push(log);
     }

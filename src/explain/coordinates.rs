@@ -266,21 +266,12 @@ impl Derivatives {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::explain::fixtures;
 
     /// Rows that were read off one plant are not those of another.
     #[test]
     fn another_plant_has_rows_of_its_own() {
-        let plant = Plant {
-            states: 2,
-            inputs: 1,
-            outputs: 1,
-            a: vec![0.9, 0.2, -0.3, 0.8],
-            b: vec![0.1, 0.5],
-            c: vec![1.0, 0.0],
-            d: vec![0.0],
-            sample_time: 0.01,
-        };
-        let coordinates = Coordinates::new(&plant);
+        let coordinates = Coordinates::new(&fixtures::plant());
         let before = coordinates.given_rows().clone();
         let mut other = coordinates.given.clone();
         other.a[2] *= 1.5;

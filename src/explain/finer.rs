@@ -91,24 +91,16 @@ impl Finer {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::explain::fixtures;
 
     /// Without forces that depend on the motion, fine steps change nothing at the samples.
     #[test]
     fn held_inputs_give_the_same_samples() {
-        let plant = Plant {
-            states: 2,
-            inputs: 1,
-            outputs: 1,
-            a: vec![0.9, 0.2, -0.3, 0.8],
-            b: vec![0.1, 0.5],
-            c: vec![1.0, 0.3],
-            d: vec![0.0],
-            sample_time: 0.01,
-        };
+        let plant = fixtures::plant();
         let input = vec![(0..200).map(|k| f64::from(k).sin()).collect::<Vec<f64>>()];
         let clock = Clock {
             start: 0.0,
-            step: 0.01,
+            step: fixtures::SAMPLE_TIME,
             fresh: false,
         };
         let coarse = run(

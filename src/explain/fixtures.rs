@@ -28,9 +28,9 @@ pub(crate) fn effect(id: &str, variant: &str) -> Instance {
     }
 }
 
-/// A mass on a spring, as given, and effects.
-pub(crate) fn spring(effects: Vec<Instance>) -> Structure {
-    let plant = Plant {
+/// A mass on a spring.
+pub(crate) fn plant() -> Plant {
+    Plant {
         states: 2,
         inputs: 1,
         outputs: 1,
@@ -39,9 +39,13 @@ pub(crate) fn spring(effects: Vec<Instance>) -> Structure {
         c: vec![1.0, 0.0],
         d: vec![0.0],
         sample_time: SAMPLE_TIME,
-    };
+    }
+}
+
+/// [`plant`] as given, and effects on it.
+pub(crate) fn spring(effects: Vec<Instance>) -> Structure {
     Structure {
-        coordinates: Arc::new(Coordinates::new(&plant)),
+        coordinates: Arc::new(Coordinates::new(&plant())),
         plant_free: false,
         initial_free: false,
         initial: vec![vec![0.0; 2]],

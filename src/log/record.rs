@@ -265,6 +265,15 @@ impl Log {
     /// # Errors
     /// Says what differs, `other` being the one at fault.
     pub fn check_same_kind(&self, other: &Self) -> Result<(), LogError> {
+        self.check_same_channels(other)?;
+        check_same_sampling(&self.name, self.sample_time, &other.name, other.sample_time)
+    }
+
+    /// Whether `other` has the same channels and units in the same order.
+    ///
+    /// # Errors
+    /// Says what differs, `other` being the one at fault.
+    pub fn check_same_channels(&self, other: &Self) -> Result<(), LogError> {
         check_same_channels(
             &self.name,
             &self.inputs,
@@ -278,8 +287,7 @@ impl Log {
             &other.name,
             &other.outputs,
             "outputs",
-        )?;
-        check_same_sampling(&self.name, self.sample_time, &other.name, other.sample_time)
+        )
     }
 
     /// Writes time, inputs and outputs as CSV to `path` (`-` is standard output, `.gz` compresses); the numbers are
