@@ -175,5 +175,5 @@ fn what_drives_lack_is_named_with_their_mass() {
     );
     assert_eq!(alarms, 0);
     assert!(wrong * 10 <= effects, "{wrong} wrong of {effects}");
-    assert!(right * 3 >= effects * 2, "{right} of {effects}");
+    assert!(right * 6 >= effects * 5, "{right} of {effects}");
 }

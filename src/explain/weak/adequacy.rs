@@ -23,6 +23,8 @@ pub(crate) fn holds(a: &Adequacy) -> bool {
 
 /// Broken lines in rate, position, input and time, fitted beside the equation's own columns; `before` is the sum of
 /// squares without what was found.
+///
+/// What is fitted is the acceleration: were it the input, a broken line in it would foretell it by itself.
 pub(crate) fn adequacy(
     windows: &Windows,
     data: &Data,
@@ -32,14 +34,20 @@ pub(crate) fn adequacy(
 ) -> Option<Adequacy> {
     let n = windows.places.len();
     let clock = |s: usize, k: usize| data.segments[s].start_time + k as f64 * data.sample_time;
+    // Straight lines in rate and input, and in the position beside a spring, are in the equation.
     let mut families: Vec<Vec<Vec<f64>>> = vec![
-        hats(windows, |s, k| windows.rate[s][k]),
-        hats(windows, |s, k| windows.input[s][k]),
-        hats(windows, clock),
+        hats(windows, |s, k| windows.rate[s][k], true),
+        hats(windows, |s, k| windows.input[s][k], true),
+        hats(windows, clock, false),
     ];
     if windows.reading == Reading::Position {
-        families.push(hats(windows, |s, k| windows.position[s][k]));
+        families.push(hats(
+            windows,
+            |s, k| windows.position[s][k],
+            equation.spring,
+        ));
     }
+    let plain = equation.fit_motion(windows, data, &[])?;
     // One family after the other beside the equation: together they may be dependent (a triangle of the position
     // is one of time).
     let mut best: Option<(f64, usize)> = None;
@@ -47,21 +55,21 @@ pub(crate) fn adequacy(
     for family in &families {
         let count = family.len();
         features += count;
-        let Some(wider) = equation.fit_with(windows, data, family) else {
+        let Some(wider) = equation.fit_motion(windows, data, family) else {
             continue;
         };
-        let gained = (fit.squares - wider.squares).max(0.0);
+        let gained = (1.0 - wider.squares / plain.squares).max(0.0);
         if best.is_none_or(|b| gained > b.0) {
             best = Some((gained, count));
         }
     }
     let (gained, count) = best?;
-    let independent = fit.effective();
+    let independent = plain.effective();
     // Chance gains this much of each feature.
-    let chance = count as f64 * fit.squares / independent.max(count as f64 + 1.0);
-    let statistic = independent * gained / (fit.squares - gained).max(1e-300);
+    let chance = count as f64 / independent.max(count as f64 + 1.0);
+    let statistic = independent * gained / (1.0 - gained).max(1e-300);
     let p_value = ChiSquared::new(count as f64).map_or(1.0, |d| d.sf(statistic));
-    let share = ((gained - chance) / fit.squares).max(0.0);
+    let share = (gained - chance).max(0.0);
     (n > 2 * features).then(|| Adequacy {
         tolerated: IMPERFECTION,
         features,
@@ -72,8 +80,13 @@ pub(crate) fn adequacy(
     })
 }
 
-/// Triangles over the quantiles of a variable, all but the first: a constant is in the equation.
-fn hats(windows: &Windows, of: impl Fn(usize, usize) -> f64) -> Vec<Vec<f64>> {
+/// Triangles over the quantiles of a variable: all but the first, for a constant is in the equation, and without the last
+/// where a straight line is in it too.
+fn hats(
+    windows: &Windows,
+    of: impl Fn(usize, usize) -> f64,
+    straight_line_known: bool,
+) -> Vec<Vec<f64>> {
     let mut corners: Vec<f64> = Vec::new();
     for i in 0..CORNERS {
         let q = i as f64 / (CORNERS - 1) as f64;
@@ -82,7 +95,7 @@ fn hats(windows: &Windows, of: impl Fn(usize, usize) -> f64) -> Vec<Vec<f64>> {
             corners.push(at);
         }
     }
-    (1..corners.len())
+    (1..corners.len() - usize::from(straight_line_known))
         .map(|i| {
             let (low, top) = (corners[i - 1], corners[i]);
             let high = corners.get(i + 1).copied();

@@ -490,7 +490,7 @@ fn finding(
 }
 
 /// Largest difference of the laws' coefficients between the halves of the windows, in standard deviations.
-fn halves(equation: &Equation, windows: &Windows, data: &Data) -> Option<f64> {
+pub(super) fn halves(equation: &Equation, windows: &Windows, data: &Data) -> Option<f64> {
     let n = windows.places.len();
     let middle = windows.places[n / 2];
     let half = |first: bool| {

@@ -29,6 +29,8 @@ mod model;
 mod rank;
 mod regression;
 mod say;
+#[cfg(test)]
+mod tests;
 mod tether;
 mod windows;
 

@@ -34,17 +34,24 @@ impl Equation {
     /// Least squares over the windows. With `ranking`, laws on the input have a coefficient of their own, which must
     /// come out near one; else they are what they are.
     pub fn fit(&self, windows: &Windows, data: &Data, ranking: bool) -> Option<Regression> {
-        self.least_squares(windows, data, ranking, &[])
+        let (target, columns) = self.system(windows, data, ranking);
+        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        Regression::new(&columns, &target)
     }
 
-    /// The same with further columns.
-    pub fn fit_with(
+    /// The acceleration from input, rate, constant, spring, laws and further columns: what the noise of the sensor is in is
+    /// then the target, and no column can take the place of the input.
+    pub fn fit_motion(
         &self,
         windows: &Windows,
         data: &Data,
         more: &[Vec<f64>],
     ) -> Option<Regression> {
-        self.least_squares(windows, data, false, more)
+        let (mut acceleration, mut columns) = self.system(windows, data, false);
+        // The input changes place with the acceleration.
+        std::mem::swap(&mut acceleration, &mut columns[0]);
+        let columns: Vec<&[f64]> = columns.iter().chain(more).map(Vec::as_slice).collect();
+        Regression::new(&columns, &acceleration)
     }
 
     /// Errors of given coefficients (as of [`Equation::fit`] without `ranking`) on windows.
@@ -60,18 +67,6 @@ impl Equation {
                 target[i] - said
             })
             .collect()
-    }
-
-    fn least_squares(
-        &self,
-        windows: &Windows,
-        data: &Data,
-        ranking: bool,
-        more: &[Vec<f64>],
-    ) -> Option<Regression> {
-        let (target, columns) = self.system(windows, data, ranking);
-        let columns: Vec<&[f64]> = columns.iter().chain(more).map(Vec::as_slice).collect();
-        Regression::new(&columns, &target)
     }
 
     /// Target and columns of the regression.
