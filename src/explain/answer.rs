@@ -35,7 +35,7 @@ pub struct Options {
 /// the averaged equation to stand in its place: it follows its own half better always, and knows no mass.
 const MUCH_BETTER: f64 = 0.5;
 
-/// What an averaged equation leaves is mostly noise below this share of structure.
+/// What the averaged equation of a drive leaves is mostly noise below this share of structure.
 const MOSTLY_NOISE: f64 = 0.5;
 
 /// Points of a trace in the document, at most.
@@ -59,11 +59,13 @@ pub fn explain(
     let known = know(recordings, simulation)?;
     let allowed = |d: &Definition| !options.without.iter().any(|id| id == d.id);
     let drive = weak::attempt(recordings, &known, &allowed);
-    // What the averaged equation explains to noise needs no other way.
+    // What the averaged equation explains to noise needs no other way, and the rest of a drive little.
     let settled = drive.as_ref().is_some_and(|(_, finding, _)| {
-        finding
-            .adequacy
-            .is_none_or(|a| a.p_value > super::adequacy::LEVEL || a.share < MOSTLY_NOISE)
+        let brought_back = |proof: &weak::Proof| proof.is_brought_back;
+        let mass_on_a_spring = finding.weak.as_deref().is_some_and(brought_back);
+        finding.adequacy.is_none_or(|a| {
+            a.p_value > super::adequacy::LEVEL || (a.share < MOSTLY_NOISE && !mass_on_a_spring)
+        })
     });
     let ordinary = (!settled)
         .then(|| inquire(&known.data, &known.structure, &allowed))

@@ -40,6 +40,9 @@ const NO_WORSE: f64 = 1.02;
 /// share: the averaged equation sees forces of a hundredth of the largest, and a law that does not show in free run is
 /// no explanation.
 const PAYS: f64 = 0.9;
+/// A free run forgets its start when its slowest motion decays within this share of the recording: what is left of it at the
+/// end is `exp(-10)`. (A spring that is no spring but an error of the equation brings a drive back in many times the recording.)
+const FORGOTTEN: f64 = 0.1;
 /// Forces that change with the side only: of these a recording hardly tells two apart.
 const SIDES: [&str; 3] = ["coulomb_friction", "stribeck_friction", "input_dead_zone"];
 
@@ -60,6 +63,8 @@ pub(crate) struct Proof {
     pub resembles: Option<(&'static Definition, f64)>,
     /// Half length of the windows in samples.
     pub half: usize,
+    /// Whether a spring brings the mass back well within the recording: it is no drive, and its free run forgets.
+    pub is_brought_back: bool,
 }
 
 impl Proof {
@@ -70,9 +75,9 @@ impl Proof {
         error_across_halves(&self.equation, &windows, problem.data, problem)
     }
 
-    /// Whether any error of a free run adds up: the position of a mass is measured.
+    /// Whether any error of a free run adds up: the position of a mass is measured, which no spring brings back.
     pub fn drifts(&self) -> bool {
-        self.equation.reading == Reading::Position
+        self.equation.reading == Reading::Position && !self.is_brought_back
     }
 }
 
@@ -454,6 +459,12 @@ fn finding(
         }
     };
     let halves_disagree = found.then(|| halves(&equation, windows, data)).flatten();
+    let lasts = data
+        .segments
+        .iter()
+        .map(|s| s.samples() as f64 * data.sample_time);
+    let is_brought_back =
+        equation.forgets_after(&fit.coefficients) < FORGOTTEN * lasts.fold(f64::INFINITY, f64::min);
     Some(Finding {
         verdict,
         boring: Boring {
@@ -480,6 +491,7 @@ fn finding(
             adequate,
             resembles,
             half: windows.half,
+            is_brought_back,
         })),
         model: if verdict == Verdict::Consistent {
             given

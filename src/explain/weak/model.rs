@@ -131,6 +131,23 @@ impl Equation {
                 })
     }
 
+    /// Time in seconds in which the slowest free motion of the position decays to `1/e`, without the laws: infinite without a
+    /// spring, for a mass then stays where it was pushed.
+    pub fn forgets_after(&self, coefficients: &[f64]) -> f64 {
+        if !self.spring {
+            return f64::INFINITY;
+        }
+        let (mass, viscous, spring) = (coefficients[0], coefficients[1], coefficients[PLAIN]);
+        // Roots of M s^2 + d s + k.
+        let (half, square) = (0.5 * viscous / mass, spring / mass);
+        let slowest = half - (half * half - square).max(0.0).sqrt();
+        if slowest > 0.0 {
+            1.0 / slowest
+        } else {
+            f64::INFINITY
+        }
+    }
+
     /// The last law's shape moved to where it fits best, within `width` (a factor) of what it is.
     pub fn refined(mut self, windows: &Windows, data: &Data, width: f64) -> Self {
         let Some(last) = self.laws.len().checked_sub(1) else {

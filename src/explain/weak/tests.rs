@@ -127,6 +127,24 @@ fn an_equation_that_is_made_a_plant_moves_as_it_says() {
     }
 }
 
+#[test]
+fn a_mass_forgets_as_fast_as_its_slowest_motion() {
+    let with = |spring| Equation {
+        spring,
+        ..equation(Reading::Position, "")
+    };
+    // Underdamped: the envelope is exp(-d/2M t); overdamped: the slower of two exponentials, here exp(-t/2).
+    let after = |numbers: &[f64]| with(true).forgets_after(numbers);
+    assert!((after(&[0.5, 0.2, 0.0, 80.0]) - 5.0).abs() < 1e-12);
+    assert!((after(&[2.0, 9.0, 0.3, 4.0]) - 2.0).abs() < 1e-12);
+    // An input that is wired in reverse.
+    assert!((after(&[-2.0, -9.0, 0.3, -4.0]) - 2.0).abs() < 1e-12);
+    // Nothing brakes it, nothing holds it.
+    assert_eq!(after(&[1.0, 0.0, 0.0, 4.0]), f64::INFINITY);
+    assert_eq!(after(&[1.0, 2.0, 0.0, -4.0]), f64::INFINITY);
+    assert_eq!(with(false).forgets_after(&[1.0, 2.0, 0.0]), f64::INFINITY);
+}
+
 /// Numbers that the noise of the sensor scatters come out within what is said, and their halves differ as they should.
 #[test]
 fn an_averaged_equation_knows_its_numbers() {
