@@ -257,6 +257,87 @@ fn direct_feedthrough_is_estimated_when_asked() {
     }
 }
 
+/// The number of samples that is asked for is the least that will do.
+#[test]
+fn as_many_samples_as_are_asked_for_suffice() {
+    for (plant, past) in [(van_wingerden_one(), 12), (two_by_two(), 9)] {
+        let of = |samples: usize| identify(&[plant.record(samples, 2)], &fixed(1, past));
+        let mut samples = 2 * past;
+        let model = loop {
+            match of(samples) {
+                Ok(model) => break model,
+                Err(
+                    IdentifyError::TooShort { needed, .. }
+                    | IdentifyError::TooShortForWindows { needed, .. },
+                ) => {
+                    assert!(needed > samples, "{needed} {samples}");
+                    assert!(of(needed - 1).is_err(), "{needed}");
+                    samples = needed;
+                }
+                Err(other) => panic!("{samples}: {other}"),
+            }
+        };
+        let warnings = model.summary.unwrap().warnings;
+        assert!(warnings.iter().any(|w| w.starts_with("short recording")));
+    }
+}
+
+/// A warning that always comes is not read.
+#[test]
+fn good_recordings_bring_no_warnings() {
+    for plant in [van_wingerden_one(), two_by_two(), servo()] {
+        for seed in 0..3 {
+            let model = identify(&[plant.record(4000, seed)], &Options::default()).unwrap();
+            assert_eq!(model.summary.unwrap().warnings, [""; 0]);
+        }
+    }
+}
+
+/// What a past window that is too short does to the answer is said, of the answer that was given.
+#[test]
+fn short_past_windows_are_warned_of() {
+    let said = [
+        "is too short for the noise dynamics",
+        "cuts off a part of the noise dynamics",
+        "not polished to maximum likelihood",
+    ];
+    let mut met = [0; 3];
+    let plants = [(van_wingerden_one(), 2), (two_by_two(), 3), (servo(), 4)];
+    for ((plant, order), past) in plants
+        .iter()
+        .flat_map(|p| (4..25).step_by(2).map(move |past| (p, past)))
+    {
+        for polish in [Polish::Auto, Polish::Always, Polish::Never] {
+            let options = Options {
+                polish,
+                ..fixed(*order, past)
+            };
+            let log = plant.record(4000, 1);
+            let summary = identify(&[log], &options).unwrap().summary.unwrap();
+            let lost = summary.diagnostics.truncation.unwrap();
+            let expected = match polish {
+                _ if lost > 100.0 => Some(0),
+                _ if lost <= 1.0 => None,
+                _ if summary.polished => Some(1),
+                Polish::Auto => Some(2),
+                Polish::Always | Polish::Never => None,
+            };
+            for (i, words) in said.iter().enumerate() {
+                let warned = summary.warnings.iter().any(|w| w.contains(words));
+                assert_eq!(
+                    warned,
+                    expected == Some(i),
+                    "{past} {polish:?} {lost}: {words}"
+                );
+            }
+            if let Some(i) = expected {
+                met[i] += 1;
+            }
+        }
+    }
+    assert!(met.iter().all(|n| *n > 0), "{met:?}");
+}
+
 #[test]
 fn impossible_requests_are_refused_with_a_reason() {
     let log = van_wingerden_one().record(400, 1);

@@ -96,3 +96,49 @@ pub fn future_for_order(past: usize, outputs: usize, order: usize) -> usize {
     let observable = 2 * (order.div_ceil(outputs) + 1);
     past.min(observable.max(SHORTEST_FUTURE).max(past / 2))
 }
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+
+    /// Each window by a least squares of its own, all over the samples that the longest can use.
+    #[test]
+    fn the_criterion_is_that_of_each_regression() {
+        let (past, samples) = (6, 150);
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut white = || random.random::<f64>() - 0.5;
+        let u: Vec<f64> = (0..samples).map(|_| white()).collect();
+        let mut y = vec![0.0; samples];
+        for k in 2..samples {
+            y[k] = 0.6 * y[k - 1] - 0.3 * y[k - 2] + u[k - 2] + 0.4 * u[k] + white();
+        }
+        let factor = RFactor::of_samples(&[&u, &y], 1, past).unwrap();
+        let count = (samples - past) as f64;
+        for feedthrough in [false, true] {
+            let found = akaike(&factor, feedthrough);
+            assert_eq!(found.len(), past);
+            for (i, (window, criterion)) in found.into_iter().enumerate() {
+                assert_eq!(window, i + 1);
+                let regressors = 2 * window + usize::from(feedthrough);
+                let x = DMatrix::from_fn(samples - past, regressors, |row, j| {
+                    let k = past + row;
+                    match j / 2 {
+                        lag if lag == window => u[k],
+                        lag if j % 2 == 0 => u[k - 1 - lag],
+                        lag => y[k - 1 - lag],
+                    }
+                });
+                let target = DMatrix::from_fn(samples - past, 1, |row, _| y[past + row]);
+                let normal = (x.transpose() * &x).try_inverse().unwrap();
+                let left = &target - &x * (normal * x.transpose() * &target);
+                let m = regressors as f64;
+                let expected = count * (left.norm_squared() / count).ln()
+                    + 2.0 * m * count / (count - m - 2.0);
+                assert_relative_eq!(criterion, expected, max_relative = 1e-9);
+            }
+        }
+    }
+}

@@ -139,3 +139,54 @@ pub fn linearise(
     let confined = &jacobian - (&jacobian * &normal) * normal.transpose();
     Linearised::new(&confined, residual, rank - active.len())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moduli_on_the_boundary_change_as_by_differences() {
+        // A pair at a modulus of 0.9, and a real eigenvalue further inside; in no special basis.
+        let (re, im) = (0.9 * 0.7_f64.cos(), 0.9 * 0.7_f64.sin());
+        let inner = DMatrix::from_row_slice(3, 3, &[re, im, 0.0, -im, re, 0.0, 0.0, 0.0, 0.85]);
+        let basis = DMatrix::from_row_slice(3, 3, &[1.0, 0.4, -0.2, 0.3, 1.5, 0.6, -0.7, 0.1, 0.8]);
+        let a = basis.clone().try_inverse().unwrap() * inner * basis;
+        let system = |a: DMatrix<f64>| StateSpace {
+            a,
+            b: DMatrix::from_element(3, 1, 1.0),
+            c: DMatrix::from_element(1, 3, 1.0),
+            d: DMatrix::zeros(1, 1),
+            k: DMatrix::zeros(3, 1),
+            sample_time: 1.0,
+        };
+        let whole = system(a.clone());
+        let layout = ParameterLayout::of(&whole, false);
+        let gradient = boundary_gradient(&whole, &layout, 0.9).unwrap();
+        assert_eq!(gradient.shape(), (1, layout.len()));
+        let modulus = |a: &DMatrix<f64>| {
+            a.complex_eigenvalues()
+                .iter()
+                .map(|v| v.norm())
+                .fold(0.0, f64::max)
+        };
+        for p in 0..9 {
+            let h = 1e-6;
+            let moved = |by: f64| {
+                let mut moved = a.clone();
+                moved[p] += by;
+                modulus(&moved)
+            };
+            let difference = (moved(h) - moved(-h)) / (2.0 * h);
+            assert!((gradient[(0, p)] - difference).abs() < 1e-7, "{p}");
+        }
+        assert!(
+            gradient
+                .columns(9, layout.len() - 9)
+                .iter()
+                .all(|v| *v == 0.0)
+        );
+        // Both are beyond a smaller radius, none beyond a larger one.
+        let rows = |radius: f64| boundary_gradient(&whole, &layout, radius).unwrap().nrows();
+        assert_eq!((rows(0.85), rows(0.91)), (2, 0));
+    }
+}
