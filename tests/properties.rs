@@ -336,6 +336,12 @@ fn short_past_windows_are_warned_of() {
         }
     }
     assert!(met.iter().all(|n| *n > 0), "{met:?}");
+    // As many states as the window has outputs: the model is the regression, and sees nothing cut off.
+    let log = van_wingerden_one().record(4000, 1);
+    let summary = identify(&[log], &fixed(2, 1)).unwrap().summary.unwrap();
+    assert!(summary.diagnostics.truncation.unwrap() < 1e-9);
+    let words = "cannot tell what the window cuts off";
+    assert!(summary.warnings.iter().any(|w| w.contains(words)));
 }
 
 #[test]

@@ -53,6 +53,16 @@ pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Option
             summary.order, test.chi_square, test.degrees_of_freedom
         ));
     }
+    // A model of as many states as the regression has past outputs is that regression itself, whose predictor forgets all
+    // beyond the window: it says that nothing is cut off, whatever is.
+    let whole_regression = summary.horizons.past * varx.innovation_covariance.nrows();
+    if options.past.is_some() && summary.order >= whole_regression && !noise_free {
+        out.push(format!(
+            "a past window of {} holds no more than a model of order {}, which cannot tell what the window cuts off: raise \
+             --past",
+            summary.horizons.past, summary.order
+        ));
+    }
     match summary.diagnostics.truncation {
         // The oblique split of innovation estimation leaves hardly any bias (at most 0.15 standard deviations where
         // the others have 0.3: example 2 of Chiuso & Picci).
