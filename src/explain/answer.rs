@@ -59,13 +59,15 @@ pub fn explain(
     let known = know(recordings, simulation)?;
     let allowed = |d: &Definition| !options.without.iter().any(|id| id == d.id);
     let drive = weak::attempt(recordings, &known, &allowed);
-    // What the averaged equation explains to noise needs no other way, and the rest of a drive little.
+    // What a law in the averaged equation explains to noise needs no other way, and the rest of a drive little. Where no law
+    // was found, the equation may be blind to what there is: effects of the sensor, another mode.
     let settled = drive.as_ref().is_some_and(|(_, finding, _)| {
         let brought_back = |proof: &weak::Proof| proof.is_brought_back;
         let mass_on_a_spring = finding.weak.as_deref().is_some_and(brought_back);
-        finding.adequacy.is_none_or(|a| {
+        let to_noise = finding.adequacy.is_none_or(|a| {
             a.p_value > super::adequacy::LEVEL || (a.share < MOSTLY_NOISE && !mass_on_a_spring)
-        })
+        });
+        finding.augmented.is_some() && to_noise
     });
     let ordinary = (!settled)
         .then(|| inquire(&known.data, &known.structure, &allowed))
@@ -109,11 +111,21 @@ fn tells_more(
             "sensor_drift" | "sensor_offset" | "load_step" | "periodic_disturbance"
         )
     });
-    if trend && equation.weak.as_ref().is_some_and(|proof| proof.drifts()) {
+    let drifts = equation.weak.as_ref().is_some_and(|proof| proof.drifts());
+    if trend && drifts {
         return false;
     }
-    if equation.verdict != Verdict::Named {
-        return true;
+    match equation.verdict {
+        Verdict::Named => {}
+        // Both find nothing: the equation knows the mass. Structure that a drifting free run leaves may be its drift.
+        Verdict::Parameters | Verdict::Consistent => {
+            return match free_run.verdict {
+                Verdict::Named | Verdict::Family => true,
+                Verdict::Unexplained => !drifts,
+                Verdict::Parameters | Verdict::Consistent => false,
+            };
+        }
+        Verdict::Family | Verdict::Unexplained => return true,
     }
     if free_run.verdict == Verdict::Unexplained {
         return false;
