@@ -108,7 +108,7 @@ fn several_inputs_and_outputs_and_feedthrough() {
     let mut example = systems::two_by_two();
     example.system.d[(0, 1)] = 0.4;
     let log = held(&example, 4000, 3);
-    for method in [Method::Knudsen, Method::Pem] {
+    for method in [Method::Knudsen, Method::Pem, Method::Subid] {
         let model = identify(
             std::slice::from_ref(&log),
             &Options {

@@ -129,3 +129,38 @@ fn shapes(at: &[f64], value: &[f64]) -> Vec<(String, f64)> {
     found.truncate(3);
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each textbook shape is recognised on top of a straight line, also upside down.
+    #[test]
+    fn shapes_are_recognised() {
+        let at: Vec<f64> = (-30..=30).map(|i| 0.2 * f64::from(i)).collect();
+        type Law = fn(f64) -> f64;
+        let laws: [(&str, Law); 8] = [
+            ("dry friction (sign)", |x| if x > 0.0 { 1.0 } else { -1.0 }),
+            ("square with sign", |x| x * x * x.signum()),
+            ("square", |x| x.powi(2)),
+            ("cube", |x| x.powi(3)),
+            ("dead zone", |x| (x - 0.3).max(0.0) + (x + 0.3).min(0.0)),
+            ("saturation", |x| x.min(0.6).max(-0.6)),
+            ("one-sided stop", |x| if x > 0.6 { x - 0.6 } else { 0.0 }),
+            ("sine", |x| (std::f64::consts::TAU * x).sin()),
+        ];
+        for (name, law) in laws {
+            for size in [3.0, -0.02] {
+                let value: Vec<f64> = at
+                    .iter()
+                    .map(|x| size * law(x / 6.0) + 0.7 * x - 0.2)
+                    .collect();
+                let found = shapes(&at, &value);
+                assert_eq!(found[0].0, name, "{found:?}");
+                assert!((found[0].1 - size.signum()).abs() < 1e-9, "{found:?}");
+            }
+        }
+        // A straight line is none of them.
+        assert!(shapes(&at, &vec![0.0; at.len()]).iter().all(|s| s.1 == 0.0));
+    }
+}

@@ -120,4 +120,35 @@ mod tests {
             assert!((a - b).abs() < 1e-12, "{a} {b}");
         }
     }
+
+    /// A force that is held over a sample does in fine steps what it does in one.
+    #[test]
+    fn shares_of_a_force_add_up() {
+        let plant = fixtures::plant();
+        let finer = Finer::new(&plant, 4).unwrap();
+        let force = ActiveForce {
+            law: |_, _, _| 1.0,
+            parameters: Vec::new(),
+            position: vec![1.0, 0.0],
+            rate: vec![0.3, 1.0],
+            rate_feedthrough: vec![0.0],
+            direction: vec![0.02, -0.7],
+            rate_gain: 0.3 * 0.02 - 0.7,
+            input: 0,
+        };
+        let share = finer.force(&force);
+        let mut state = [0.0; 2];
+        for _ in 0..4 {
+            let next = [
+                finer.a[(0, 0)] * state[0] + finer.a[(0, 1)] * state[1],
+                finer.a[(1, 0)] * state[0] + finer.a[(1, 1)] * state[1],
+            ];
+            state = [next[0] + share.direction[0], next[1] + share.direction[1]];
+        }
+        for (sum, whole) in state.iter().zip(&force.direction) {
+            assert!((sum - whole).abs() < 1e-12, "{sum} {whole}");
+        }
+        let gain = 0.3 * share.direction[0] + share.direction[1];
+        assert!((share.rate_gain - gain).abs() < 1e-15);
+    }
 }

@@ -424,6 +424,9 @@ mod tests {
             assert!((scale / truth - 1.0).abs() < 0.1, "{scale}");
         }
         assert!(noise.degrees <= 4.0, "{}", noise.degrees);
+        // Coefficients and a size an output, and the degrees.
+        let coefficients: usize = noise.ar.iter().map(Vec::len).sum();
+        assert_eq!(noise.len(), coefficients + 2 + 1);
         // Its likelihood, by the density of Student's t.
         let v = noise.degrees;
         let whitened = noise.whiten(&residual);

@@ -104,6 +104,19 @@ mod tests {
 
     use super::*;
 
+    #[test]
+    fn the_future_is_long_enough_for_the_order() {
+        // Half the past; ten; or twice what observability asks for. Never more than the past.
+        assert_eq!(future_for_order(60, 2, 5), 30);
+        assert_eq!(future_for_order(14, 2, 5), 10);
+        assert_eq!(future_for_order(30, 1, 9), 20);
+        assert_eq!(future_for_order(30, 2, 16), 18);
+        assert_eq!(future_for_order(7, 1, 9), 7);
+        assert_eq!(future_for_order_choice(40, 2, 30), 17);
+        assert_eq!(future_for_order_choice(40, 2, 4), 10);
+        assert_eq!(future_for_order_choice(6, 2, 30), 6);
+    }
+
     /// Each window by a least squares of its own, all over the samples that the longest can use.
     #[test]
     fn the_criterion_is_that_of_each_regression() {

@@ -144,6 +144,21 @@ pub fn linearise(
 mod tests {
     use super::*;
 
+    /// Parameters in units a trillion times as large move a trillionth as far, and gain the same.
+    #[test]
+    fn steps_know_no_units() {
+        let jacobian = DMatrix::from_fn(9, 3, |i, j| ((i * 3 + j * j + i * j) as f64).sin());
+        let residual: Vec<f64> = (0..9).map(|i| f64::from(i).cos()).collect();
+        let free = DMatrix::zeros(0, 3);
+        let at = |unit: f64| linearise(&jacobian * unit, &residual, 3, &free).unwrap();
+        let (one, small) = (at(1.0), at(1e-14));
+        assert!((small.decrease() / one.decrease() - 1.0).abs() < 1e-9);
+        for damping in [0.0, 0.1, 3.0] {
+            let (a, b) = (one.step(damping), small.step(damping) * 1e-14);
+            assert!((&a - &b).norm() < 1e-9 * a.norm(), "{damping}: {a} {b}");
+        }
+    }
+
     #[test]
     fn moduli_on_the_boundary_change_as_by_differences() {
         // A pair at a modulus of 0.9, and a real eigenvalue further inside; in no special basis.
