@@ -117,13 +117,10 @@ fn tells_more(
     }
     match equation.verdict {
         Verdict::Named => {}
-        // Both find nothing: the equation knows the mass. Structure that a drifting free run leaves may be its drift.
+        // Where neither has a name, the free run tells what the recording would have shown; but the structure that a drifting
+        // one leaves may be its drift, and the equation knows the mass.
         Verdict::Parameters | Verdict::Consistent => {
-            return match free_run.verdict {
-                Verdict::Named | Verdict::Family => true,
-                Verdict::Unexplained => !drifts,
-                Verdict::Parameters | Verdict::Consistent => false,
-            };
+            return !drifts || matches!(free_run.verdict, Verdict::Named | Verdict::Family);
         }
         Verdict::Family | Verdict::Unexplained => return true,
     }

@@ -145,7 +145,9 @@ mod tests {
             ("square", |x| x.powi(2)),
             ("cube", |x| x.powi(3)),
             ("dead zone", |x| (x - 0.3).max(0.0) + (x + 0.3).min(0.0)),
-            ("saturation", |x| x.min(0.6).max(-0.6)),
+            ("saturation", |x| {
+                if x.abs() < 0.6 { x } else { 0.6 * x.signum() }
+            }),
             ("one-sided stop", |x| if x > 0.6 { x - 0.6 } else { 0.0 }),
             ("sine", |x| (std::f64::consts::TAU * x).sin()),
         ];
