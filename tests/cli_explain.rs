@@ -482,3 +482,84 @@ fn explanations_are_no_models() {
     let message = about(&folder, &["recording.csv"], &["e.json"], &[]);
     says(&message, &["e.json", "an explanation and not a model"]);
 }
+
+/// Another zero of the clock moves every time that is said, and nothing else.
+#[test]
+fn times_are_those_of_the_recording() {
+    let folder = Folder::new();
+    let case = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("data/concealed/case_001");
+    let later = |name: &str, by: f64| {
+        let text = std::fs::read_to_string(case.join(name)).unwrap();
+        let mut lines = text.lines();
+        let header = lines.next().unwrap().to_owned();
+        let moved = lines.map(|line| {
+            let (t, rest) = line.split_once(',').unwrap();
+            format!("{},{rest}", t.parse::<f64>().unwrap() + by)
+        });
+        let moved: Vec<String> = std::iter::once(header).chain(moved).collect();
+        folder.text(&format!("{by}_{name}"), &(moved.join("\n") + "\n"));
+    };
+    let said = |by: f64| -> Value {
+        later("recording.csv", by);
+        later("simulation.csv", by);
+        let (recording, simulation) = (
+            format!("{by}_recording.csv"),
+            format!("{by}_simulation.csv"),
+        );
+        let arguments = [
+            "explain",
+            &recording,
+            "--simulation",
+            &simulation,
+            "--output",
+            "e.json",
+        ];
+        let run = folder.run(&arguments);
+        assert_eq!(run.code, 0, "{}", run.stderr);
+        json(&folder.join("e.json"))
+    };
+    let (early, late) = (said(0.0), said(640.0));
+    let numbers = |v: &Value| -> Vec<f64> {
+        v.as_array()
+            .unwrap()
+            .iter()
+            .map(|v| v.as_f64().unwrap())
+            .collect()
+    };
+    let moved = |path: &str| {
+        let (a, b) = (
+            numbers(early.pointer(path).unwrap()),
+            numbers(late.pointer(path).unwrap()),
+        );
+        assert!(!a.is_empty() && a.len() == b.len(), "{path}");
+        for (a, b) in a.iter().zip(&b) {
+            assert!((b - a - 640.0).abs() < 1e-3, "{path}: {a} {b}");
+        }
+    };
+    moved("/signals/0/time");
+    for path in [
+        "/where/time/0/0",
+        "/where/time/0/1",
+        "/effects/0/parameters/from/value",
+    ] {
+        let at = |e: &Value| e.pointer(path).unwrap().as_f64().unwrap();
+        assert!((at(&late) - at(&early) - 640.0).abs() < 1e-3, "{path}");
+    }
+    // What is drawn at a time is what was recorded then.
+    let text = std::fs::read_to_string(case.join("recording.csv")).unwrap();
+    let recorded: Vec<f64> = text
+        .lines()
+        .skip(1)
+        .map(|line| line.rsplit(',').next().unwrap().parse().unwrap())
+        .collect();
+    let picture = &late["signals"][0];
+    for (t, y) in numbers(&picture["time"])
+        .iter()
+        .zip(numbers(&picture["recorded"]))
+    {
+        let k = ((t - 640.0) / 0.01).round() as usize;
+        assert!((recorded[k] - y).abs() < 1e-12, "{t}");
+    }
+    let share = |e: &Value| e["remaining"]["share"].as_f64().unwrap();
+    assert!((share(&late) - share(&early)).abs() < 1e-6);
+}

@@ -31,7 +31,7 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// A free-run fit must run through the half of the recording that it was not fitted to with an error this many times that of
+/// A free-run fit of a drive must run through the half of the recording that it was not fitted to with an error this many times that of
 /// the averaged equation to stand in its place: it follows its own half better always, and knows no mass.
 const MUCH_BETTER: f64 = 0.5;
 
@@ -59,15 +59,15 @@ pub fn explain(
     let known = know(recordings, simulation)?;
     let allowed = |d: &Definition| !options.without.iter().any(|id| id == d.id);
     let drive = weak::attempt(recordings, &known, &allowed);
-    // What a law in the averaged equation explains to noise needs no other way, and the rest of a drive little. Where no law
-    // was found, the equation may be blind to what there is: effects of the sensor, another mode.
+    // What a law in the averaged equation of a drive explains to noise needs no other way, and the rest little. Where no law
+    // was found, the equation may be blind to what there is (effects of the sensor, another mode), and where a spring
+    // brings the mass back, a free run tells as well.
     let settled = drive.as_ref().is_some_and(|(_, finding, _)| {
-        let brought_back = |proof: &weak::Proof| proof.is_brought_back;
-        let mass_on_a_spring = finding.weak.as_deref().is_some_and(brought_back);
-        let to_noise = finding.adequacy.is_none_or(|a| {
-            a.p_value > super::adequacy::LEVEL || (a.share < MOSTLY_NOISE && !mass_on_a_spring)
-        });
-        finding.augmented.is_some() && to_noise
+        finding.augmented.is_some()
+            && !is_brought_back(finding)
+            && finding
+                .adequacy
+                .is_none_or(|a| a.p_value > super::adequacy::LEVEL || a.share < MOSTLY_NOISE)
     });
     let ordinary = (!settled)
         .then(|| inquire(&known.data, &known.structure, &allowed))
@@ -97,6 +97,14 @@ pub fn explain(
         seed: options.seed,
     }
     .say())
+}
+
+/// Whether the finding is an averaged equation of what is no drive, but a mass on a spring.
+fn is_brought_back(finding: &Finding) -> bool {
+    finding
+        .weak
+        .as_ref()
+        .is_some_and(|proof| proof.is_brought_back)
 }
 
 /// Whether a free-run fit tells more of a drive than its averaged equation, which leaves structure.
@@ -131,6 +139,7 @@ fn tells_more(
         free_run.error_across_halves(fitted, mask),
         equation.error_across_halves(whole, counted),
     ) {
+        (Some(free), Some(averaged)) if is_brought_back(equation) => free < averaged,
         (Some(free), Some(averaged)) => free < MUCH_BETTER * averaged,
         // What a half does not determine has nothing to say of the other.
         (free, None) => free.is_some(),

@@ -247,3 +247,71 @@ impl Pieces {
         &self.of_output[from..from + self.width]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is left of central differences of the prediction errors when those by the initial state are regressed out.
+    #[test]
+    fn derivatives_are_those_of_differences() {
+        let system = StateSpace {
+            a: DMatrix::from_row_slice(3, 3, &[0.7, 0.2, 0.0, -0.3, 0.8, 0.1, 0.1, 0.0, 0.5]),
+            b: DMatrix::from_row_slice(3, 1, &[1.0, 0.3, -0.6]),
+            c: DMatrix::from_row_slice(2, 3, &[1.0, 0.0, 0.2, 0.4, -1.0, 0.7]),
+            d: DMatrix::from_row_slice(2, 1, &[0.1, -0.2]),
+            k: DMatrix::from_row_slice(3, 2, &[0.3, 0.1, -0.1, 0.2, 0.0, 0.25]),
+            sample_time: 1.0,
+        };
+        let signal = |rate: f64, shift: f64| -> Vec<f64> {
+            (0..60)
+                .map(|k| (rate * f64::from(k * k) + shift).sin())
+                .collect()
+        };
+        let signals = [signal(0.37, 0.0), signal(0.11, 1.0), signal(0.23, 2.0)];
+        let (u, y) = split(&signals, 1);
+        let x0 = DVector::from_column_slice(&[0.5, -1.0, 0.8]);
+        let layout = ParameterLayout::of(&system, true);
+        let whitener = DMatrix::from_row_slice(2, 2, &[2.0, 0.0, -0.7, 0.5]);
+        let theta = layout.pack(&system);
+        let errors = |theta: &[f64], x0: &DVector<f64>| {
+            let of = layout.unpack(theta, &system);
+            let e = of.one_step(&u, &y, Some(x0)).unwrap().innovations;
+            DVector::from_iterator(
+                2 * e[0].len(),
+                (0..e[0].len())
+                    .flat_map(|k| [2.0 * e[0][k], -0.7 * e[0][k] + 0.5 * e[1][k]])
+                    .collect::<Vec<f64>>(),
+            )
+        };
+        let h = 1e-6;
+        let by_state = |i: usize| {
+            let (mut up, mut down) = (x0.clone(), x0.clone());
+            up[i] += h;
+            down[i] -= h;
+            (errors(&theta, &up) - errors(&theta, &down)) / (2.0 * h)
+        };
+        let by_number = |p: usize| {
+            let (mut up, mut down) = (theta.clone(), theta.clone());
+            up[p] += h;
+            down[p] -= h;
+            (errors(&up, &x0) - errors(&down, &x0)) / (2.0 * h)
+        };
+        let of_state = DMatrix::from_columns(&[by_state(0), by_state(1), by_state(2)]);
+        let mut columns: Vec<DVector<f64>> = (0..theta.len()).map(by_number).collect();
+        columns.push(errors(&theta, &x0));
+        let all = DMatrix::from_columns(&columns);
+        let inverse = of_state.clone().pseudo_inverse(1e-12).unwrap();
+        let left = &all - &of_state * (inverse * &all);
+        let expected = left.transpose() * &left;
+        let directions = DMatrix::identity(theta.len(), theta.len());
+        let factor =
+            linearised_errors(&system, &layout, &directions, &signals, &x0, &whitener).unwrap();
+        let found = factor.transpose() * &factor;
+        assert!(
+            (&found - &expected).amax() < 1e-6 * expected.amax(),
+            "{}",
+            (&found - &expected).amax() / expected.amax()
+        );
+    }
+}
