@@ -19,7 +19,7 @@
 //! | `cascade`, `tanks`, `rectified` | plants of another class, which no effect added to the linear one becomes |
 //! | `search`, `refine`, `plausible`, `second`, `inquiry` | the fits, what is kept of them, the decision |
 //! | `weak` | drives: the averaged equation of motion, where a free run cannot tell |
-//! | `memory` | what a question takes of it |
+//! | `question`, `memory` | which ways are gone and which of them speaks; what that takes of the memory |
 //! | `exact`, `adequacy` | tests without fits, and of what is left |
 //! | `locate`, `curve`, `prove`, `probability` | where, the law without a form, held-out blocks, how sure |
 //! | `answer`, `account`, `words`, `explanation`, `augmented`, `start` | what is said, and the model that can be run |
@@ -52,6 +52,7 @@ mod plant;
 mod plausible;
 mod probability;
 mod prove;
+mod question;
 mod rebaseline;
 mod rectified;
 mod refine;
@@ -67,7 +68,6 @@ mod templates;
 mod weak;
 mod words;
 
-pub use answer::{Options, explain};
 pub use augmented::AugmentedError;
 pub use error::ExplainError;
 pub use explanation::{
@@ -76,4 +76,5 @@ pub use explanation::{
     NoiseFound, ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces,
     StatePrior, Verdict,
 };
+pub use question::{Options, explain};
 pub use simulation::Simulation;
