@@ -5,7 +5,8 @@
 
 #![cfg(unix)]
 
-mod cli_support;
+#[path = "support/folder.rs"]
+mod folder;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use cli_support::{Folder, json};
+use folder::{Folder, json};
 use innovant::systems;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,12 +1,13 @@
 //! What would not fit into memory is refused at once, with the memory that it would take; and the estimates are right.
 
-mod cli_support;
+#[path = "support/folder.rs"]
+mod folder;
 
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use cli_support::Folder;
+use folder::Folder;
 use innovant::limits::parse_size;
 use innovant::log::{Channel, Log};
 use innovant::systems;

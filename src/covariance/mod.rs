@@ -7,7 +7,7 @@
 //! the literal form to 1e-13. The terms beta of his Appendix B carry a **plus**: the residual is
 //! `Ehat = E - E Pi_Z`, so its error is `-E Pi_Z`, and the printed minus of (B.2) and (B.4) is wrong. With a
 //! predictor that is exactly nilpotent the propagation is an identity, which settles the sign
-//! (`tests/literal_covariance.rs`).
+//! (`tests/library/literal_covariance.rs`).
 //!
 //! | file | what it holds |
 //! |---|---|

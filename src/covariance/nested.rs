@@ -21,7 +21,7 @@
 //! coefficients on future outputs, times `C A^j`, join those on the past, and `S` is `S G` with `G` the block Toeplitz
 //! matrix of the impulse response of the noise model.
 //!
-//! This is Chiuso & Picci (3.1)-(3.5) with the printed errors repaired (`tests/literal_nested.rs` holds the two forms
+//! This is Chiuso & Picci (3.1)-(3.5) with the printed errors repaired (`tests/library/literal_nested.rs` holds the two forms
 //! against each other): `M_x1 = K [I 0] - A Gamma^-L` with **A**, where `A - K C` is printed; `M_.2` goes with the longer
 //! past `z-bar^-` and `M_x2`; in (3.5) the lag is `h - k + 1`; section 4 keeps all columns of the QR factor to the last.
 

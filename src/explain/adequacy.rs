@@ -197,3 +197,6 @@ fn line(whitened: &Series, mask: &Mask) -> Structure {
     }
     found
 }
+
+#[cfg(test)]
+mod tests;

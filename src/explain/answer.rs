@@ -333,7 +333,7 @@ impl Answer<'_> {
             time: if found { time } else { Vec::new() },
             frequency: locate::frequencies(&before, &after),
             regime: if found {
-                locate::regimes(data, boring, squares, &self.mask, shown, names)
+                locate::regimes(data, &boring.simulated, squares, &self.mask, shown, names)
             } else {
                 Vec::new()
             },

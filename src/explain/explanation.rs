@@ -12,7 +12,6 @@ use crate::report::Rows;
 /// Format name and version of the document.
 pub const EXPLANATION_FORMAT: &str = "innovant-explanation/1";
 
-/// Answers whose criteria differ by less explain the recording equally well (Kass and Raftery 1995: 6 is "strong").
 fn one() -> usize {
     1
 }
@@ -22,6 +21,7 @@ fn is_one(steps: &usize) -> bool {
     *steps == 1
 }
 
+/// Answers whose criteria differ by less explain the recording equally well (Kass and Raftery 1995: 6 is "strong").
 pub(crate) const EFFECTS_TIE: f64 = 6.0;
 
 /// The answer's kind.

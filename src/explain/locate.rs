@@ -6,7 +6,6 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::data::{Data, Series};
 use super::effects;
 use super::explanation::Regime;
-use super::fit::Fit;
 use super::noise::{Mask, Noise};
 
 /// Family-wise level of every map.
@@ -227,10 +226,11 @@ pub(crate) fn spectrum_picture(before: &[(f64, f64)], after: &[(f64, f64)]) -> V
     picture
 }
 
-/// Operating regions of output `output` in which the difference is larger than elsewhere.
+/// Operating regions of output `output` in which the difference is larger than elsewhere: eighths of the samples by the
+/// size and by the signed value of each input, of the simulated output and of its rate.
 pub(crate) fn regimes(
     data: &Data,
-    fit: &Fit,
+    simulated: &Series,
     squares: &Series,
     mask: &Mask,
     output: usize,
@@ -250,9 +250,9 @@ pub(crate) fn regimes(
         ));
         variables.push((names.0[input].clone(), u));
     }
-    let y = over_segments(&|s| fit.simulated[s * l + output].clone());
+    let y = over_segments(&|s| simulated[s * l + output].clone());
     let rate = over_segments(&|s| {
-        let y = &fit.simulated[s * l + output];
+        let y = &simulated[s * l + output];
         (0..y.len())
             .map(|k| (y[(k + 1).min(y.len() - 1)] - y[k.saturating_sub(1)]) / (2.0 * h))
             .collect()
@@ -277,13 +277,15 @@ pub(crate) fn regimes(
         let edges: Vec<f64> = (0..=8)
             .map(|i| effects::level(&values, f64::from(i) / 8.0, |v| v))
             .collect();
-        for pair in edges.windows(2) {
+        for (eighth, pair) in edges.windows(2).enumerate() {
+            // The ends are open: the edges are those of some samples, and a binary input stands on them.
+            let holds = |v: f64| (v >= pair[0] || eighth == 0) && (v < pair[1] || eighth == 7);
             let (mut inside, mut n_in, mut outside, mut n_out) = (0.0, 0.0, 0.0, 0.0);
             for ((v, e), keep) in values.iter().zip(&square).zip(&counts) {
                 if !keep {
                     continue;
                 }
-                if *v >= pair[0] && *v < pair[1] {
+                if holds(*v) {
                     inside += e;
                     n_in += 1.0;
                 } else {
@@ -407,6 +409,78 @@ mod tests {
                 .iter()
                 .all(|p| (p[1] + 10.0).abs() < 1.5)
         );
+    }
+
+    /// Inputs above are high: an eighth of a ramp.
+    const HIGH: f64 = 0.875;
+
+    /// Two recordings of two outputs, of which the second missed three times as much where its input was high.
+    fn unequal(input: fn(usize) -> f64) -> (Data, Series, Series, Mask) {
+        let n = 1000;
+        let mut data = data(n);
+        data.outputs = 2;
+        let second = |s: usize| (0..n).map(|k| input(2 * k + s)).collect::<Vec<f64>>();
+        data.segments = (0..2)
+            .map(|s| Segment {
+                inputs: vec![second(s)],
+                outputs: vec![vec![0.0; n]; 2],
+                start_time: 0.0,
+            })
+            .collect();
+        let simulated: Series = (0..4)
+            .map(|i| noise(n, 40 + i).iter().map(|e| e - 1.0).collect())
+            .collect();
+        let mut squares: Series = (0..4).map(|i| noise(n, 50 + i)).collect();
+        for s in 0..2 {
+            let high = second(s);
+            for (e, u) in squares[2 * s + 1].iter_mut().zip(&high) {
+                *e *= if *u > HIGH { 9.0 } else { 1.0 };
+            }
+        }
+        (data, simulated, squares, vec![vec![true; n]; 4])
+    }
+
+    #[test]
+    fn an_operating_region_is_where_errors_are_larger() {
+        let names = (&["u".to_owned()][..], &["a".to_owned(), "b".to_owned()][..]);
+        // A ramp: the region is one end of it. A switch, of which all samples stand on the edges.
+        let inputs: [fn(usize) -> f64; 2] = [
+            |k| (k % 400) as f64 / 400.0,
+            |k| if k % 37 < 20 { 1.0 } else { -1.0 },
+        ];
+        for (which, input) in inputs.into_iter().enumerate() {
+            let (data, simulated, squares, mask) = unequal(input);
+            let of =
+                |output, mask: &Mask| regimes(&data, &simulated, &squares, mask, output, names);
+            let found = of(1, &mask);
+            assert!(!found.is_empty());
+            for region in &found {
+                assert!(
+                    region.variable == "u" || region.variable == "|u|",
+                    "{region:?}"
+                );
+                assert!(region.to > HIGH && region.p_value < 1e-6, "{region:?}");
+            }
+            let strongest = &found[0];
+            assert!((strongest.excess / 9.0 - 1.0).abs() < 0.35, "{strongest:?}");
+            if which == 0 {
+                assert!(
+                    strongest.from > 0.86 && strongest.to > strongest.from,
+                    "{strongest:?}"
+                );
+            }
+            // The other output missed as much everywhere; and what does not count is not looked at.
+            assert!(of(0, &mask).is_empty());
+            let calm: Mask = (0..4)
+                .map(|i| {
+                    data.segments[i / 2].inputs[0]
+                        .iter()
+                        .map(|u| *u <= HIGH)
+                        .collect()
+                })
+                .collect();
+            assert!(of(1, &calm).is_empty());
+        }
     }
 
     #[test]

@@ -542,3 +542,6 @@ fn data_of(recordings: &[Log], delays: &[usize]) -> Data {
 pub(crate) fn delayed(u: &[f64], delay: usize) -> Vec<f64> {
     (0..u.len()).map(|k| u[k.saturating_sub(delay)]).collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -15,7 +15,7 @@
 //! # The same input gives the same bytes
 //! Documents and pages hold no time, no host and nothing that depends on the number of threads: the same version of the
 //! program makes the same bytes of the same files and the same request on the same kind of processor
-//! (`tests/reproducible.rs`). Where a document comes from stands in one place, and is all that may differ when the same
+//! (`tests/cli/reproducible.rs`). Where a document comes from stands in one place, and is all that may differ when the same
 //! bytes come under another name or are asked for in other words: `provenance` of a model (`tool`, `version`,
 //! `recordings` with name and SHA-256, `request`); `version` and `recordings` of an explanation; `model` and `recordings`
 //! of a validation. Of the summary of a batch `status` and `seconds` are of the run.

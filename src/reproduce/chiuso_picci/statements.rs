@@ -116,7 +116,7 @@ fn correlation(points: &[(f64, f64)]) -> f64 {
 }
 
 /// Errors in print that change the variance. Each is settled by a derivation that the literal formulas, so
-/// repaired, agree with (`tests/literal_nested.rs`).
+/// repaired, agree with (`tests/library/literal_nested.rs`).
 pub(super) fn misprints() -> Vec<Comparison> {
     let row = |place: &str, paper: &str, here: &str, why: &str| {
         Comparison::new(place, paper, here, Agreement::Misprint, why)

@@ -2,12 +2,10 @@
 //! Wingerden, repaired, `default_rng(1)`, N = 2000, p = f = 10, n = 4, all columns, degrees of freedom in
 //! the innovation covariance, corrected sign. The CSV holds the very samples, in shortest round-trip form.
 
-#[path = "support/command.rs"]
-mod command;
-
 use assert_cmd::Command;
-use command::run;
 use serde_json::Value;
+
+use crate::command::run;
 
 const TOLERANCE: f64 = 1e-6;
 

@@ -1,12 +1,11 @@
 //! What is done with a model: simulate, validate, show, and the small commands.
 
-mod cli_support;
-
 use std::fs;
 
-use cli_support::{Folder, columns};
 use innovant::log::Log;
 use innovant::systems;
+
+use crate::folder::{Folder, columns};
 
 const BARE: &str =
     r#"{"A": 0.5, "B": [[1]], "C": 1, "dt": 0.1, "unknown": {"keys": "are ignored"}}"#;

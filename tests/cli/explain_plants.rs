@@ -2,13 +2,12 @@
 //! linear model that was identified from the same recording: tanks, and sensors that lose the sign. And recordings that
 //! look like theirs and are not.
 
-mod cli_support;
-
-use cli_support::{Folder, json};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use serde_json::Value;
+
+use crate::folder::{Folder, json};
 
 /// Small steps a sample.
 const FINE: usize = 100;

@@ -1,12 +1,11 @@
 //! Questions that `innovant explain` cannot answer end in exit code 2 and one message that says where and what to do,
 //! and leave no file behind; so do explanations that cannot be simulated.
 
-mod cli_support;
-
-use cli_support::{Folder, json};
 use innovant::model::StateSpace;
 use innovant::systems;
 use serde_json::Value;
+
+use crate::folder::{Folder, json};
 
 const SAMPLES: usize = 600;
 

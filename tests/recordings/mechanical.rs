@@ -1,25 +1,16 @@
-//! `explain` on public recordings of machines, blind: a drive with dry friction, an oscillator with a cubic spring, and a
-//! hair dryer that a linear model describes.
-//!
-//! The recordings are data of others and not in this repository; where they are missing, the tests say so and pass.
-//! Their splits are those of the benchmarks; the fits see the training part only.
-
-use std::path::PathBuf;
+//! A drive with dry friction, an oscillator with a cubic spring, and a hair dryer that a linear model describes, through
+//! the library. Their splits are those of the benchmarks; the fits see the training part only.
 
 use innovant::explain::{Explanation, Options, Simulation, Verdict, explain};
 use innovant::identify;
 use innovant::log::{Log, Roles, Source};
 use innovant::{Model, linalg::spectral_radius};
 
+use crate::recordings;
+
 /// The recording, or `None` with a printed reason.
 fn recording(name: &str, roles: &Roles) -> Option<Log> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/recordings")
-        .join(name);
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
-        return None;
-    }
+    let path = recordings()?.join(name);
     Some(Log::read(&Source::from(path), roles).unwrap())
 }
 

@@ -1,9 +1,8 @@
 //! `innovant reproduce`.
 
-mod cli_support;
-
-use cli_support::Folder;
 use std::fs;
+
+use crate::folder::Folder;
 
 #[test]
 fn files_do_not_depend_on_the_number_of_threads() {

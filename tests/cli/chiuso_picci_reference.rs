@@ -2,13 +2,9 @@
 //! line: three recordings in closed loop, both weights, everything that does not depend on the state basis. The
 //! recordings hold the very samples, in shortest round-trip form.
 
-#[path = "support/command.rs"]
-mod command;
-
 use std::path::PathBuf;
 
 use assert_cmd::Command;
-use command::run;
 use innovant::covariance::{
     AsymptoticMethod, asymptotic_covariance, frequency_response_covariance,
 };
@@ -16,6 +12,8 @@ use innovant::identify::{Prediction, Weight};
 use innovant::systems::{ClosedLoop, chiuso_picci_one, chiuso_picci_two, van_wingerden_one};
 use nalgebra::DMatrix;
 use serde_json::Value;
+
+use crate::command::run;
 
 /// Largest error allowed, relative to the largest entry of the quantity.
 const TOLERANCE: f64 = 1e-8;

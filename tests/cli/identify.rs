@@ -1,14 +1,13 @@
 //! `innovant identify`, from the outside.
 
-mod cli_support;
-
 use std::fs;
 use std::io::Write;
 
-use cli_support::{Folder, json};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use innovant::systems;
+
+use crate::folder::{Folder, json};
 
 #[test]
 fn a_log_becomes_a_table_and_a_model() {

@@ -1,13 +1,12 @@
 //! The same input gives the same bytes: twice, and on any number of threads. Where a document says where it comes from is
 //! the only place in which it may differ.
 
-mod cli_support;
-
 use std::fs;
 use std::path::Path;
 
-use cli_support::{Folder, json};
 use innovant::systems;
+
+use crate::folder::{Folder, json};
 
 fn concealed(case: &str, name: &str) -> String {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/concealed");

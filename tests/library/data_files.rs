@@ -1,12 +1,9 @@
 //! The recordings of `data/` are what their notes say: simulated by the test systems of the library.
 
-#[path = "support/data.rs"]
-mod data;
-
 #[test]
 fn recordings_are_those_of_the_test_systems() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
-    for (name, made) in data::recordings() {
+    for (name, made) in crate::data::recordings() {
         let stored = std::fs::read_to_string(folder.join(name)).unwrap();
         // Compared as numbers: the last decimal may differ where the machine's mathematics does.
         assert_eq!(stored.lines().count(), made.lines().count(), "{name}");

@@ -1,25 +1,12 @@
-//! What `innovant explain` says, blind, of recordings of real plants.
-//!
-//! They are data of others, so they are not part of the project: the tests look for them in `../shared/recordings` and
-//! are left out, with a printed reason, where that is missing. Sources and published figures are in the notes there.
-
-mod cli_support;
+//! Tanks, coupled drives and a hair dryer, through the command line.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use cli_support::{Folder, columns, json};
 use serde_json::Value;
 
-fn recordings() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/recordings");
-    if folder.is_dir() {
-        Some(folder)
-    } else {
-        println!("left out: {} is missing", folder.display());
-        None
-    }
-}
+use crate::folder::{Folder, columns, json};
+use crate::recordings;
 
 fn ids(explanation: &Value) -> Vec<&str> {
     explanation["effects"]

@@ -1,12 +1,10 @@
 //! Does the stated variance hold for every method? Example 1 of Chiuso & Picci. The whole study (1000 runs, both
 //! examples) is `cargo run --release --example variance_study`.
 
-#[path = "support/variance.rs"]
-mod variance;
-
 use innovant::identify::{Method, Weight};
 use innovant::systems::{chiuso_picci_frequencies, chiuso_picci_one};
-use variance::Study;
+
+use crate::variance::Study;
 
 const METHODS: [(Method, Weight); 4] = [
     (Method::PbsidOpt, Weight::Identity),

@@ -1,13 +1,12 @@
 //! Bad input ends in exit code 2 and one message that says where and what to do, and leaves nothing behind.
 
-mod cli_support;
-
 use std::io::Write;
 
-use cli_support::Folder;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use innovant::systems;
+
+use crate::folder::Folder;
 
 /// A recording as rows of text, so that it can be spoilt.
 fn rows() -> Vec<String> {

@@ -1,17 +1,18 @@
 //! The cases of `data/concealed/` through the command line: what is said of them, that documents keep to their
 //! schema, and that an explanation that was written simulates as the one in memory.
 
-mod cli_support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use cli_support::{Folder, columns, json};
-use innovant::explain::{ExplainError, Explanation, Options, Simulation, explain};
+use innovant::explain::{
+    ExplainError, Explanation, FitFigure, Options, Simulation, Verdict, explain,
+};
 use innovant::log::{Log, RoleNeed, Roles, Source};
 use innovant::report::{explanation_schema, parse_explanation};
 use rayon::prelude::*;
 use serde_json::Value;
+
+use crate::folder::{Folder, columns, json};
 
 /// How many cases there are, and how many must be answered rightly.
 const CASES: usize = 12;
@@ -78,6 +79,7 @@ fn ask(case: &str, validator: &jsonschema::Validator) -> Said {
         "{case}"
     );
     round_trip(case, &data, &scratch, &explanation);
+    figures_agree(case, &explanation);
 
     let verdict = document["verdict"].as_str().unwrap().to_owned();
     let ids = |value: &Value, key: Option<&str>| -> Vec<String> {
@@ -113,6 +115,79 @@ fn ask(case: &str, validator: &jsonschema::Validator) -> Said {
         case: case.to_owned(),
         right,
     }
+}
+
+/// What is said in one place of a document follows from what stands in another.
+fn figures_agree(case: &str, said: &Explanation) {
+    let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * (1.0 + a.abs().max(b.abs()));
+    let train = &said.fit.train;
+    let left = 1.0 - train.parameters_only.fit_percent / 100.0;
+    let share = (1.0 - left * left).clamp(0.0, 1.0);
+    let size = &said.effect_size;
+    assert!(
+        close(size.linear_share, share),
+        "{case}: {size:?} {train:?}"
+    );
+    let kept = train.augmented.rmse / train.parameters_only.rmse;
+    let removed = (1.0 - kept * kept).clamp(0.0, 1.0);
+    assert!(close(size.removed_share, removed), "{case}: {size:?}");
+    // Error and fit are of one spread.
+    let spread = |f: &FitFigure| f.rmse / (1.0 - f.fit_percent / 100.0);
+    for steps in [Some(train), said.fit.heldout.as_ref()]
+        .into_iter()
+        .flatten()
+    {
+        for figure in [&steps.simulation, &steps.augmented] {
+            let (a, b) = (spread(figure), spread(&steps.parameters_only));
+            assert!((a / b - 1.0).abs() < 1e-6, "{case}: {steps:?}");
+        }
+        assert!(
+            steps.augmented.rmse < 1.02 * steps.parameters_only.rmse,
+            "{case}: {steps:?}"
+        );
+    }
+    if let Some(heldout) = &said.fit.heldout {
+        let gain = heldout.parameters_only.rmse - heldout.augmented.rmse;
+        assert!(close(size.heldout_gain, gain), "{case}: {size:?}");
+        if let Some([low, high]) = heldout.improvement_95 {
+            assert!(low <= gain && gain <= high, "{case}: {gain} {heldout:?}");
+        }
+    }
+    // A name stands on blocks that were never fitted.
+    if let (Verdict::Named, Some(first)) = (said.verdict, said.effects.first()) {
+        let evidence = &first.evidence;
+        assert!(
+            evidence.criterion_gain > evidence.criterion_needed,
+            "{case}"
+        );
+        assert!(
+            evidence.heldout_gain.is_none_or(|g| g > 0.0),
+            "{case}: {evidence:?}"
+        );
+        assert!(size.heldout_gain > 0.0, "{case}: {size:?}");
+        assert!(
+            said.fit.train.noise_floor.rmse < 1.05 * train.augmented.rmse,
+            "{case}"
+        );
+        for alternative in &said.alternatives {
+            let share = alternative.criterion_gain / evidence.criterion_gain;
+            assert!(
+                close(alternative.support, share.clamp(0.0, 1.0)),
+                "{case}: {alternative:?}"
+            );
+        }
+    }
+    let remaining = &said.remaining;
+    assert!(
+        (0.0..=1.0).contains(&remaining.p_value),
+        "{case}: {remaining:?}"
+    );
+    let quiet = remaining.sentence.contains("is noise to");
+    assert!(!quiet || remaining.adequate, "{case}: {remaining:?}");
+    assert!(
+        remaining.features == 0 || quiet == (remaining.p_value > 1e-4),
+        "{case}: {remaining:?}"
+    );
 }
 
 /// The prediction of the command line for the fresh input is that of the library.

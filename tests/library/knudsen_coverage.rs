@@ -1,6 +1,6 @@
 //! Does the delta-method covariance of tk-chol say how far off the estimate is?
 //!
-//! `cargo test --release --test knudsen_coverage -- --nocapture` prints the shares.
+//! `cargo test --release --test library knudsen_coverage -- --nocapture` prints the shares.
 
 use innovant::covariance::{
     ellipse_quantile, frequency_response_covariance, interval_quantile, noise_response_covariance,

@@ -1,8 +1,5 @@
 //! Knudsen's methods, the prediction error method and subid through the whole pipeline: library, command line, JSON.
 
-mod cli_support;
-
-use cli_support::{Folder, json};
 use innovant::covariance::pole_uncertainties;
 use innovant::identify::method::Method;
 use innovant::identify::stochastic::Stochastic;
@@ -11,6 +8,8 @@ use innovant::linalg::{spectral_radius, symmetric_eigen};
 use innovant::log::Log;
 use innovant::model::StateSpace;
 use innovant::systems;
+
+use crate::folder::{Folder, json};
 
 fn options(method: Method, order: usize) -> Options {
     Options {

@@ -1,15 +1,14 @@
 //! `innovant batch`, from the outside.
 
-mod cli_support;
-
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use cli_support::{Folder, json};
 use innovant::systems;
 use serde_json::Value;
+
+use crate::folder::{Folder, json};
 
 /// A batch of these logs into `models`.
 fn batch(folder: &Folder, logs: &[&str], more: &[&str]) -> cli_support::Run {
