@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 use innovant::systems;
 use serde_json::Value;
 
-use crate::folder::{Folder, json};
+use crate::folder::{Folder, Run, json};
 
 /// A batch of these logs into `models`.
-fn batch(folder: &Folder, logs: &[&str], more: &[&str]) -> cli_support::Run {
+fn batch(folder: &Folder, logs: &[&str], more: &[&str]) -> Run {
     let mut arguments = vec!["batch"];
     arguments.extend(logs);
     arguments.extend(["--output-dir", "models"]);

@@ -98,7 +98,10 @@ fn a_law_that_was_missed_is_seen_in_its_size() {
         let (before, now) = (whitened(&bare), whitened(&half));
         let expected = left.share * now / (before - now);
         assert!(!left.holds(), "{left:?}");
-        assert!((left.of_removed / expected - 1.0).abs() < 0.2, "{left:?} {expected}");
+        assert!(
+            (left.of_removed / expected - 1.0).abs() < 0.2,
+            "{left:?} {expected}"
+        );
     }
 }
 
