@@ -7,6 +7,9 @@ use crate::explain::fit::Effort;
 use crate::explain::fixtures::{SAMPLES, effect, recorded, spring};
 use crate::explain::structure::Structure;
 
+/// Of the law.
+const SIZE: f64 = 300.0;
+
 /// A linear plant, all its numbers free.
 fn linear() -> Structure {
     Structure {
@@ -61,21 +64,21 @@ fn noise_is_called_structure_as_often_as_the_level_says() {
 fn a_law_that_was_missed_is_seen_in_its_size() {
     for seed in 0..4 {
         let mut truth = spring(vec![effect("cubic_stiffness", "")]).given();
-        truth.push(4.0);
+        truth.push(SIZE);
         let data = recorded(&spring(vec![effect("cubic_stiffness", "")]), &truth, seed);
         let problem = Problem::new(&data);
         let without = fitted(&problem, linear(), None);
-        let with = fitted(&problem, stiffening(), Some(4.0));
+        let with = fitted(&problem, stiffening(), Some(SIZE));
 
         let missed = adequacy(&problem, &without, &without, None).unwrap();
         assert!(missed.p_value < LEVEL && !missed.holds(), "{missed:?}");
-        // What the law removes is the structure that was there: hats in the position are nearly that law.
+        // What the law removes is the structure that was there: hats in the position are near that law, and what chance explains is taken off.
         let noise = Noise::estimate(&without.residual, 1, &problem.mask, 1);
         let there = square(&noise.whiten(&without.residual), &problem.mask);
         let now = square(&noise.whiten(&with.residual), &problem.mask);
         let structure = 1.0 - now / there;
         assert!(
-            missed.share > 0.6 * structure && missed.share < 1.02 * structure,
+            missed.share > 0.45 * structure && missed.share < 1.02 * structure,
             "{} of {structure}",
             missed.share
         );
@@ -85,17 +88,17 @@ fn a_law_that_was_missed_is_seen_in_its_size() {
 
         let found = adequacy(&problem, &with, &without, Some(&without)).unwrap();
         assert!(found.p_value > LEVEL && found.holds(), "{found:?}");
-        assert!(found.of_removed.is_finite() && found.of_removed < OF_REMOVED);
+        assert!(found.of_removed.is_finite() && found.of_removed < 0.1);
 
-        // Half of the law is left: over what the other half has removed.
-        let mut half = truth.clone();
-        *half.last_mut().unwrap() = 2.0;
-        let half = Fit::at(&problem, spring(vec![effect("cubic_stiffness", "")]), half).unwrap();
+        // A tenth of the law is known: what is left, over what the tenth has removed.
+        let mut tenth = truth.clone();
+        *tenth.last_mut().unwrap() = 0.1 * SIZE;
+        let tenth = Fit::at(&problem, spring(vec![effect("cubic_stiffness", "")]), tenth).unwrap();
         let bare = Fit::at(&problem, spring(Vec::new()), Vec::new()).unwrap();
-        let left = adequacy(&problem, &half, &bare, Some(&bare)).unwrap();
-        let noise = Noise::estimate(&half.residual, 1, &problem.mask, 1);
+        let left = adequacy(&problem, &tenth, &bare, Some(&bare)).unwrap();
+        let noise = Noise::estimate(&tenth.residual, 1, &problem.mask, 1);
         let whitened = |fit: &Fit| square(&noise.whiten(&fit.residual), &problem.mask);
-        let (before, now) = (whitened(&bare), whitened(&half));
+        let (before, now) = (whitened(&bare), whitened(&tenth));
         let expected = left.share * now / (before - now);
         assert!(!left.holds(), "{left:?}");
         assert!(
