@@ -31,7 +31,12 @@ impl Answer<'_> {
 
     pub(crate) fn effects(&self, problem: &Problem, model: &Fit) -> Vec<EffectFound> {
         let mut fit = model.clone();
-        let certainty = fit.certainty(problem);
+        let mut certainty = fit.certainty(problem);
+        if let Some(certainty) = &mut certainty {
+            let structure = &model.structure;
+            let from = structure.effect_offset(structure.first_new());
+            fit.narrow(problem, &mut certainty.covariance, from..structure.len());
+        }
         let covariance = certainty.as_ref().map(|c| &c.covariance);
         let disagreement = certainty.as_ref().and_then(|c| c.halves_disagree.as_ref());
         let mut found = Vec::new();

@@ -4,6 +4,7 @@
 
 mod certainty;
 mod gauss_newton;
+mod profile;
 mod slopes;
 #[cfg(test)]
 mod tests;
@@ -192,7 +193,7 @@ impl Fit {
         let mut best: Option<Self> = None;
         for _ in 0..rounds {
             let noise = fit.noise.clone();
-            fit.descend(problem, &noise, effort);
+            fit.descend(problem, &noise, effort, None);
             fit.noise = problem.noise(&fit.residual);
             fit.deviance = fit.noise.deviance(&fit.residual, &problem.mask);
             fit.free = fit.structure.len() + fit.noise.len();
@@ -209,9 +210,9 @@ impl Fit {
         best
     }
 
-    /// Steps at a fixed noise model while they help. Derivatives serve several steps: near the optimum they hardly
+    /// Steps at a fixed noise model while they help, number `held` left where it is. Derivatives serve several steps: near the optimum they hardly
     /// change, and they are what costs.
-    fn descend(&mut self, problem: &Problem, noise: &Noise, effort: Effort) {
+    fn descend(&mut self, problem: &Problem, noise: &Noise, effort: Effort, held: Option<usize>) {
         let bounds = self.structure.bounds();
         let mut damping = 1e-3;
         let mut cost = noise.deviance(&self.residual, &problem.mask);
@@ -229,7 +230,11 @@ impl Fit {
                 }
                 taken += 1;
                 age = 0;
-                jacobian = Jacobian::new(problem, noise, &self.sensitivities(problem));
+                let mut slopes = self.sensitivities(problem);
+                if let Some(held) = held {
+                    slopes[held] = None;
+                }
+                jacobian = Jacobian::new(problem, noise, &slopes);
             }
             let Some(derivatives) = &jacobian else {
                 return;

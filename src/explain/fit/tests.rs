@@ -1,3 +1,4 @@
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::certainty::Certainty;
@@ -161,4 +162,32 @@ fn sizes_are_in_deviations_of_the_outputs() {
     problem.mask[0][100..200].fill(false);
     assert!((problem.mean_square(&loud) - 0.25).abs() < 1e-12);
     assert_eq!(problem.count(), N - MOST_ORDER - 100);
+}
+
+#[test]
+fn profiles_agree_with_slopes_where_all_is_smooth() {
+    let data = recording(1);
+    let problem = Problem::new(&data);
+    let mut fit = Fit::run(&problem, structure(), truth(), None, Effort::FINAL).unwrap();
+    let covariance = fit.certainty(&problem).unwrap().covariance;
+    let all = 0..fit.theta.len();
+    let mut kept = covariance.clone();
+    fit.narrow(&problem, &mut kept, all.clone());
+    assert_eq!(kept, covariance);
+    for i in all {
+        let std = covariance[(i, i)].sqrt();
+        let reached = [-1.0, 1.0].map(|side| fit.reach(&problem, i, side, 4.0 * std).unwrap());
+        let ratio = 0.5 * (reached[0] + reached[1]) / std;
+        assert!((ratio - 1.0).abs() < 0.1, "number {i}: {ratio}");
+        // As if slopes had said nothing: a hundred times as uncertain.
+        let mut wide = covariance.clone();
+        wide.row_mut(i).scale_mut(100.0);
+        wide.column_mut(i).scale_mut(100.0);
+        fit.narrow(&problem, &mut wide, i..i + 1);
+        let ratio = wide[(i, i)].sqrt() / std;
+        assert!((ratio - 1.0).abs() < 0.15, "number {i}: {ratio}");
+        let j = (i + 1) % fit.theta.len();
+        let correlation = |c: &DMatrix<f64>| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt();
+        assert!((correlation(&wide) - correlation(&covariance)).abs() < 1e-9);
+    }
 }
