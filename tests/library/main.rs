@@ -1,6 +1,7 @@
 //! The library: the papers' formulas in their literal form, reference arithmetic, invariances, and what every method has
 //! to do.
 
+mod answers;
 mod chiuso_picci_variance;
 #[path = "../support/data.rs"]
 mod data;

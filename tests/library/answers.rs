@@ -1,0 +1,134 @@
+//! What an answer says in numbers - where, when, how large, how certain - of recordings that were made for it.
+
+use innovant::explain::{Explanation, Options, Simulation, Verdict, explain};
+use innovant::log::{Channel, Log};
+use innovant::model::StateSpace;
+use nalgebra::DMatrix;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+const SAMPLES: usize = 1200;
+const SAMPLE_TIME: f64 = 0.1;
+/// Time of the first sample: a recording rarely begins at zero.
+const START: f64 = 20.0;
+/// Standard deviation of the noise at either output.
+const NOISE: f64 = 0.05;
+
+/// A mass on a spring, seen by two sensors.
+fn plant() -> StateSpace {
+    StateSpace {
+        a: DMatrix::from_row_slice(2, 2, &[0.95, 0.09, -0.9, 0.85]),
+        b: DMatrix::from_row_slice(2, 1, &[0.005, 0.09]),
+        c: DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.4, 0.25]),
+        d: DMatrix::zeros(2, 1),
+        k: DMatrix::zeros(2, 2),
+        sample_time: SAMPLE_TIME,
+    }
+}
+
+fn log(name: &str, input: Vec<f64>, outputs: Vec<Vec<f64>>) -> Log {
+    let channel = |name: &str| Channel {
+        name: name.to_owned(),
+        unit: None,
+    };
+    Log {
+        name: name.to_owned(),
+        sample_time: SAMPLE_TIME,
+        start_time: START,
+        inputs: vec![channel("u")],
+        outputs: vec![channel("a"), channel("b")],
+        input_data: vec![input],
+        output_data: outputs,
+        sha256: None,
+    }
+}
+
+/// What is said of the plant with white noise and what `change` does to its outputs (`output`, `sample`).
+fn said(seed: u64, change: impl Fn(&mut [Vec<f64>])) -> Explanation {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut white = |size: f64| -> Vec<f64> {
+        (0..SAMPLES)
+            .map(|_| size * random.sample::<f64, _>(StandardNormal))
+            .collect()
+    };
+    let input = white(4.0);
+    let simulated = plant().simulate(&[&input], None).unwrap();
+    let mut recorded = simulated.clone();
+    for column in &mut recorded {
+        for (y, e) in column.iter_mut().zip(white(NOISE)) {
+            *y += e;
+        }
+    }
+    change(&mut recorded);
+    let simulation = Simulation::Outputs(vec![log("simulation", input.clone(), simulated)]);
+    explain(
+        &[log("recording", input, recorded)],
+        &simulation,
+        &Options::default(),
+    )
+    .unwrap()
+}
+
+#[test]
+fn a_frozen_sensor_is_said_in_the_recordings_time() {
+    let (from, to) = (300, 340);
+    let answer = said(1, |y| {
+        let held = y[1][from];
+        y[1][from..to].fill(held);
+    });
+    assert_eq!(answer.verdict, Verdict::Named, "{:?}", answer.summary);
+    assert_eq!(answer.effects.len(), 1);
+    let found = &answer.effects[0];
+    assert_eq!(
+        (found.effect.as_str(), found.signal.as_str()),
+        ("sensor_freeze", "b")
+    );
+    let time = |k: usize| START + SAMPLE_TIME * k as f64;
+    for (name, at) in [("from", time(from)), ("to", time(to))] {
+        let said = found.parameters[name].value;
+        assert!(
+            (said - at).abs() < 1.5 * SAMPLE_TIME,
+            "{name}: {said} for {at}"
+        );
+    }
+    let [begins, ends, _] = answer.location.time[0];
+    assert!((begins - time(from)).abs() < 1.5 * SAMPLE_TIME);
+    assert!((ends - time(to)).abs() < 1.5 * SAMPLE_TIME);
+    assert_eq!(answer.location.port.as_deref(), Some("output"));
+}
+
+#[test]
+fn amplitudes_at_each_output_are_as_certain_as_white_noise_allows() {
+    // Least squares of a sinusoid in white noise: 2 s^2 / N (Kay 1993, example 3.14).
+    let expected = NOISE * (2.0 / SAMPLES as f64).sqrt();
+    let amplitudes = [0.03, 0.06];
+    let mut squares = 0.0;
+    let runs = 8;
+    for seed in 0..runs {
+        let answer = said(10 + seed, |y| {
+            for (column, amplitude) in y.iter_mut().zip(amplitudes) {
+                for (k, y) in column.iter_mut().enumerate() {
+                    *y += amplitude
+                        * (0.9 * SAMPLE_TIME * std::f64::consts::TAU * k as f64 + 0.3).sin();
+                }
+            }
+        });
+        assert_eq!(answer.verdict, Verdict::Named, "{:?}", answer.summary);
+        let found = &answer.effects[0];
+        assert_eq!(found.effect, "periodic_disturbance");
+        // The output that shows it most, over its noise.
+        assert_eq!(found.signal, "b");
+        for (name, truth) in [("amplitude_a", 0.03), ("amplitude_b", 0.06)] {
+            let amplitude = &found.parameters[name];
+            let std = amplitude.std.unwrap();
+            assert!(
+                (0.8..1.4).contains(&(std / expected)),
+                "{name}: {std} for {expected}"
+            );
+            squares += ((amplitude.value - truth) / std).powi(2);
+        }
+    }
+    // Chi-squared with 16 degrees of freedom: between its quantiles 0.1 % and 99.9 %.
+    assert!((3.9..39.3).contains(&squares), "{squares}");
+}
