@@ -245,7 +245,7 @@ fn of_model(recordings: &[Log], model: &Model, name: &str) -> Result<Known, Expl
 /// Samples that are explained, at most: more than a name needs (250 to 2000, math/explain.md), and quick.
 const MOST_SAMPLES: usize = 8000;
 
-/// Cuts each recording to the stretch in which the outputs vary most.
+/// Cuts each recording to the stretch in which the outputs go furthest: what was left out shows at the ends of the range.
 fn trimmed(data: &mut Data) {
     let most = (MOST_SAMPLES / data.segments.len().max(1)).max(1000);
     let scale = data.output_scale();
@@ -262,10 +262,9 @@ fn trimmed(data: &mut Data) {
                 .iter()
                 .zip(&scale)
                 .map(|(y, s)| {
-                    y[from..from + most]
-                        .iter()
-                        .map(|v| (v / s).abs())
-                        .fold(0.0, f64::max)
+                    let stretch = &y[from..from + most];
+                    let end = |of: fn(f64, f64) -> f64| stretch.iter().copied().reduce(of);
+                    (end(f64::max).unwrap_or(0.0) - end(f64::min).unwrap_or(0.0)) / s
                 })
                 .sum();
             if size > best.0 * 1.01 {

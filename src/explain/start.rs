@@ -201,3 +201,55 @@ fn climb(
     }
     Ok((x, cost))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn prior(mean: [f64; 2], weight: [f64; 4]) -> Prior {
+        Prior {
+            mean: DVector::from_row_slice(&mean),
+            weight: DMatrix::from_row_slice(2, 2, &weight),
+            spread: vec![1.0, 10.0],
+        }
+    }
+
+    #[test]
+    fn linear_errors_give_the_posterior_mean() {
+        let h = DMatrix::from_row_slice(3, 2, &[1.0, 0.3, -2.0, 0.5, 0.1, 0.0]);
+        let y = DVector::from_row_slice(&[3.0, -1.0, 2.0]);
+        let prior = prior([5.0, -7.0], [0.8, 0.2, 0.2, 0.3]);
+        let error = |x: &DVector<f64>| Ok(&y - &h * x);
+        let (found, cost) = climb(&error, &prior, DVector::zeros(2)).unwrap();
+        let right = h.tr_mul(&y) + &prior.weight * &prior.mean;
+        let expected = (h.tr_mul(&h) + &prior.weight)
+            .cholesky()
+            .unwrap()
+            .solve(&right);
+        assert!(
+            (&found - &expected).norm() < 1e-6 * expected.norm(),
+            "{found}"
+        );
+        let off = &expected - &prior.mean;
+        let there = (&y - &h * &expected).norm_squared() + off.dot(&(&prior.weight * &off));
+        assert!((cost - there).abs() < 1e-9 * there);
+    }
+
+    #[test]
+    fn a_bent_valley_is_followed_to_its_end() {
+        let error = |x: &DVector<f64>| {
+            Ok(DVector::from_row_slice(&[
+                1.0 - x[0],
+                10.0 * (x[1] - x[0] * x[0]),
+            ]))
+        };
+        let prior = prior([0.0, 0.0], [1e-12, 0.0, 0.0, 1e-12]);
+        let start = DVector::from_row_slice(&[-1.2, 1.0]);
+        let (found, cost) = climb(&error, &prior, start).unwrap();
+        assert!(
+            (found[0] - 1.0).abs() < 1e-4 && (found[1] - 1.0).abs() < 1e-4,
+            "{found}"
+        );
+        assert!(cost < 1e-8);
+    }
+}

@@ -66,6 +66,12 @@ impl Jacobian {
         }
     }
 
+    /// The whitened columns, of the values that count.
+    #[cfg(test)]
+    pub fn columns(&self) -> &DMatrix<f64> {
+        &self.columns
+    }
+
     /// The weighted least-squares system at `residual`, of all rows or of those that `only` lets pass.
     pub fn normal_equations(
         &self,

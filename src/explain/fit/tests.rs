@@ -191,3 +191,47 @@ fn profiles_agree_with_slopes_where_all_is_smooth() {
         assert!((correlation(&wide) - correlation(&covariance)).abs() < 1e-9);
     }
 }
+
+/// Broyden's condition, and the least change: what is across the step keeps its derivative.
+#[test]
+fn updated_derivatives_foretell_the_step_that_was_made() {
+    let data = recording(1);
+    let problem = Problem::new(&data);
+    let mut fit = Fit::at(&problem, structure(), truth()).unwrap();
+    let noise = fit.noise.clone();
+    let slopes = fit.sensitivities(&problem);
+    let mut jacobian = Jacobian::new(&problem, &noise, &slopes).unwrap();
+    let count = fit.theta.len();
+    let step = DVector::from_fn(count, |i, _| 0.05 * truth()[i] * (1.0 + i as f64).sin());
+    let ahead: Vec<f64> = truth()
+        .iter()
+        .zip(step.iter())
+        .map(|(t, s)| t + s)
+        .collect();
+    let moved = structure().simulate(&ahead, &data).unwrap();
+    let change = noise.whiten(&difference(&moved, &fit.simulated));
+    let change: Vec<f64> = change
+        .iter()
+        .zip(&problem.mask)
+        .flat_map(|(e, mask)| e.iter().zip(mask))
+        .filter(|(_, keep)| **keep)
+        .map(|(e, _)| *e)
+        .collect();
+    let change = DVector::from_vec(change);
+    let before = jacobian.columns().clone();
+    let missed = (&before * &step - &change).norm();
+    assert!(
+        missed > 1e-3 * change.norm(),
+        "the step is no test: {missed}"
+    );
+    jacobian.update(&problem, &noise, &step, &fit.simulated, &moved);
+    let after = jacobian.columns();
+    assert!((after * &step - &change).norm() < 1e-9 * change.norm());
+    // Across, on the scale of the columns.
+    let lengths = DVector::from_iterator(count, before.column_iter().map(|c| c.norm_squared()));
+    let mut across = DVector::from_fn(count, |i, _| (2.0 + i as f64).cos() / lengths[i].sqrt());
+    let along = across.component_mul(&lengths).dot(&step);
+    across -= &step * (along / step.component_mul(&lengths).dot(&step));
+    let kept = (after - before) * &across;
+    assert!(kept.norm() < 1e-9 * change.norm());
+}

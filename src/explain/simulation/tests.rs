@@ -48,3 +48,47 @@ fn a_model_simulates_about_its_operating_points() {
         }
     }
 }
+
+#[test]
+fn a_long_recording_is_cut_to_where_it_moves_furthest() {
+    let n = 5 * MOST_SAMPLES / 2;
+    let busy = 13_000..13_700;
+    // About an operating point, which is no motion.
+    let wave =
+        |k: usize| 300.0 + if busy.contains(&k) { 5.0 } else { 1.0 } * (0.01 * k as f64).sin();
+    let segment = |samples: usize| Segment {
+        inputs: vec![(0..samples).map(|k| k as f64).collect()],
+        outputs: vec![(0..samples).map(wave).collect()],
+        start_time: 40.0,
+    };
+    let data = |segments: Vec<Segment>| Data {
+        segments,
+        sample_time: 0.5,
+        inputs: 1,
+        outputs: 1,
+        constant: false,
+    };
+    let mut long = data(vec![segment(n)]);
+    trimmed(&mut long);
+    let kept = &long.segments[0];
+    assert_eq!(kept.samples(), MOST_SAMPLES);
+    // Inputs stay beside their outputs, and the clock with both.
+    let from = kept.inputs[0][0];
+    assert!(
+        from <= busy.start as f64 && from + MOST_SAMPLES as f64 >= busy.end as f64,
+        "{from}"
+    );
+    assert_eq!(kept.start_time, 40.0 + 0.5 * from);
+    for (k, (u, y)) in kept.inputs[0].iter().zip(&kept.outputs[0]).enumerate() {
+        assert_eq!((*u, *y), (from + k as f64, wave(from as usize + k)));
+    }
+    // A quarter more is not worth a cut; and several share what there is.
+    let mut short = data(vec![segment(MOST_SAMPLES + MOST_SAMPLES / 4)]);
+    trimmed(&mut short);
+    assert_eq!(short.segments[0].samples(), MOST_SAMPLES + MOST_SAMPLES / 4);
+    assert_eq!(short.segments[0].start_time, 40.0);
+    let mut two = data(vec![segment(n), segment(900)]);
+    trimmed(&mut two);
+    let samples: Vec<usize> = two.segments.iter().map(Segment::samples).collect();
+    assert_eq!(samples, [MOST_SAMPLES / 2, 900]);
+}
