@@ -88,8 +88,9 @@ struct Answer {
     missing: Missing,
     verdict: Verdict,
     names: Vec<String>,
-    /// As a share of the true one.
+    /// As a share of the true one, and its stated standard deviation as such a share.
     mass: f64,
+    mass_std: f64,
     /// Of a free run on a fresh recording, in percent.
     fit: f64,
     line: String,
@@ -110,8 +111,14 @@ fn ask(missing: Missing, speed: bool, mut dice: Dice) -> Answer {
         .mechanics
         .as_ref()
         .map_or(f64::NAN, |m| m.mass.value / drive.mass);
+    let mass_std = said
+        .model
+        .mechanics
+        .as_ref()
+        .and_then(|m| m.mass.std)
+        .map_or(f64::NAN, |std| std / drive.mass);
     let line = format!(
-        "{missing:?}{}: {:?} {names:?}, mass {mass:.4}, fresh free run {fit:.1} %",
+        "{missing:?}{}: {:?} {names:?}, mass {mass:.4} +- {mass_std:.4}, fresh free run {fit:.1} %",
         if speed { " (speed)" } else { "" },
         said.verdict
     );
@@ -120,6 +127,7 @@ fn ask(missing: Missing, speed: bool, mut dice: Dice) -> Answer {
         verdict: said.verdict,
         names,
         mass,
+        mass_std,
         fit,
         line,
     }

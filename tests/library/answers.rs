@@ -104,7 +104,7 @@ fn amplitudes_at_each_output_are_as_certain_as_white_noise_allows() {
     let expected = NOISE * (2.0 / SAMPLES as f64).sqrt();
     let amplitudes = [0.03, 0.06];
     let mut squares = 0.0;
-    let runs = 8;
+    let runs = 4;
     for seed in 0..runs {
         let answer = said(10 + seed, |y| {
             for (column, amplitude) in y.iter_mut().zip(amplitudes) {
@@ -129,6 +129,6 @@ fn amplitudes_at_each_output_are_as_certain_as_white_noise_allows() {
             squares += ((amplitude.value - truth) / std).powi(2);
         }
     }
-    // Chi-squared with 16 degrees of freedom: between its quantiles 0.1 % and 99.9 %.
-    assert!((3.9..39.3).contains(&squares), "{squares}");
+    // Chi-squared with 8 degrees of freedom: between its quantiles 0.1 % and 99.9 %.
+    assert!((0.86..26.2).contains(&squares), "{squares}");
 }

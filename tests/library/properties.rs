@@ -257,11 +257,30 @@ fn direct_feedthrough_is_estimated_when_asked() {
     }
 }
 
+const METHODS: [Method; 5] = [
+    Method::PbsidOpt,
+    Method::Whitening,
+    Method::InnovationEstimation,
+    Method::Knudsen,
+    Method::Subid,
+];
+
 /// The number of samples that is asked for is the least that will do.
 #[test]
 fn as_many_samples_as_are_asked_for_suffice() {
-    for (plant, past) in [(van_wingerden_one(), 12), (two_by_two(), 9)] {
-        let of = |samples: usize| identify(&[plant.record(samples, 2)], &fixed(1, past));
+    let plants = [(van_wingerden_one(), 12), (two_by_two(), 9)];
+    for ((plant, past), method, feedthrough) in plants.iter().flat_map(|plant| {
+        METHODS
+            .iter()
+            .flat_map(move |method| [false, true].map(|direct| (plant, *method, direct)))
+    }) {
+        let what = format!("{method:?} {past} {feedthrough}");
+        let options = Options {
+            method,
+            feedthrough,
+            ..fixed(1, *past)
+        };
+        let of = |samples: usize| identify(&[plant.record(samples, 2)], &options);
         let mut samples = 2 * past;
         let model = loop {
             match of(samples) {
@@ -270,15 +289,18 @@ fn as_many_samples_as_are_asked_for_suffice() {
                     IdentifyError::TooShort { needed, .. }
                     | IdentifyError::TooShortForWindows { needed, .. },
                 ) => {
-                    assert!(needed > samples, "{needed} {samples}");
-                    assert!(of(needed - 1).is_err(), "{needed}");
+                    assert!(needed > samples, "{what}: {needed} {samples}");
+                    assert!(of(needed - 1).is_err(), "{what}: {needed}");
                     samples = needed;
                 }
-                Err(other) => panic!("{samples}: {other}"),
+                Err(other) => panic!("{what}: {samples}: {other}"),
             }
         };
         let warnings = model.summary.unwrap().warnings;
-        assert!(warnings.iter().any(|w| w.starts_with("short recording")));
+        assert!(
+            warnings.iter().any(|w| w.starts_with("short recording")),
+            "{what}: {warnings:?}"
+        );
     }
 }
 

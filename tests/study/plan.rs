@@ -44,7 +44,7 @@ fn variable<T: FromStr>(name: &str) -> Option<T> {
 impl Plan {
     /// The default, with what the environment changes of it.
     pub fn from_environment() -> Self {
-        let effects = variable("INNOVANT_CONCEALED_CASES").unwrap_or(40);
+        let effects = variable("INNOVANT_CONCEALED_CASES").unwrap_or(36);
         Self {
             seed: variable("INNOVANT_CONCEALED_SEED").unwrap_or(2026),
             samples: variable("INNOVANT_CONCEALED_SAMPLES").unwrap_or(2000),

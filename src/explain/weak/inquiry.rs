@@ -193,13 +193,17 @@ fn tethered(
 ) -> Option<(Tethered, Regression)> {
     let regression = equation.fit(windows, data, false)?;
     let covariance = regression.covariance();
-    let fit = tether(
+    let mut fit = tether(
         equation,
         data,
         mask,
         (regression.coefficients.as_slice(), &covariance),
         windows.half,
     )?;
+    // What the sensor's noise takes off mass and friction is an error of them as well, of a size that is known.
+    for (i, share) in windows.attenuation.into_iter().enumerate() {
+        fit.covariance[(i, i)] += (share * fit.coefficients[i]).powi(2);
+    }
     Some((fit, regression))
 }
 

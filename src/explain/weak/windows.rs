@@ -52,6 +52,8 @@ pub(crate) struct Windows {
     pub input: Vec<Vec<f64>>,
     /// Size of a quick motion: the 90 % quantile of the rate.
     pub quick: f64,
+    /// Share by which the sensor's noise lowers the coefficients of acceleration and rate, about.
+    pub attenuation: [f64; 2],
     bump: Vec<f64>,
 }
 
@@ -224,8 +226,12 @@ impl Windows {
             if windows.places.len() < LEAST_WINDOWS / 2 {
                 return None;
             }
-            if windows.attenuation(data.sample_time, noise) <= ATTENUATION {
-                return Some(windows);
+            let attenuation = windows.attenuation_by(data.sample_time, noise);
+            if attenuation.iter().all(|share| *share <= ATTENUATION) {
+                return Some(Self {
+                    attenuation,
+                    ..windows
+                });
             }
             half += half / 2;
         }
@@ -259,6 +265,7 @@ impl Windows {
                 })
                 .collect(),
             quick,
+            attenuation: [0.0; 2],
             bump: weights,
             position: Vec::new(),
             rate: Vec::new(),
@@ -329,7 +336,7 @@ impl Windows {
     }
 
     /// By what share the sensor's noise lowers the coefficients of acceleration and rate, at most.
-    fn attenuation(&self, step: f64, noise: f64) -> f64 {
+    fn attenuation_by(&self, step: f64, noise: f64) -> [f64; 2] {
         let kernels = Kernels::new(&self.bump, step, self.reading);
         let energy = |kernel: &[f64]| noise * noise * kernel.iter().map(|w| w * w).sum::<f64>();
         let n = self.places.len().max(1) as f64;
@@ -343,8 +350,10 @@ impl Windows {
         let (aa, vv, av) = (moment(&a, &a), moment(&v, &v), moment(&a, &v));
         // What each has that the other does not explain.
         let own = |own: f64, other: f64| own - av * av / other.max(1e-300);
-        (energy(&kernels.acceleration) / own(aa, vv).max(1e-300))
-            .max(energy(&kernels.rate) / own(vv, aa).max(1e-300))
+        [
+            energy(&kernels.acceleration) / own(aa, vv).max(1e-300),
+            energy(&kernels.rate) / own(vv, aa).max(1e-300),
+        ]
     }
 }
 

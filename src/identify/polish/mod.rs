@@ -261,7 +261,15 @@ mod tests {
             start.a[(0, 1)] += 0.05;
             start.b[(1, 0)] -= 0.1;
             start.k[(0, 0)] += 0.1;
+            let layout = ParameterLayout::of(&truth, feedthrough);
+            let whitened = Problem::new(&varx, layout).unwrap().cost(&start);
+            let cost = coefficient_cost(&start, &varx).unwrap();
+            assert!(
+                cost > 1.0 && (cost / whitened - 1.0).abs() < 1e-9,
+                "{cost} {whitened}"
+            );
             let result = polish(&start, &varx, None, Effort::Full).unwrap();
+            assert!((result.start_cost / cost - 1.0).abs() < 1e-9);
             assert!(result.converged && result.cost < 1e-10 * result.start_cost);
             let found = predictor_coefficients(&result.system, 6, feedthrough);
             assert!((found - &varx.coefficients).amax() < 1e-8);

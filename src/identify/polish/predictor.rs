@@ -252,9 +252,10 @@ pub mod tests {
     pub fn system(feedthrough: bool) -> StateSpace {
         StateSpace {
             a: DMatrix::from_row_slice(2, 2, &[0.7, 0.3, -0.3, 0.6]),
-            b: DMatrix::from_row_slice(2, 1, &[1.0, -0.5]),
+            b: DMatrix::from_row_slice(2, 3, &[1.0, 0.2, -0.7, -0.5, 0.9, 0.3]),
             c: DMatrix::from_row_slice(2, 2, &[1.0, 0.2, -0.4, 0.8]),
-            d: DMatrix::from_element(2, 1, if feedthrough { 0.3 } else { 0.0 }),
+            d: DMatrix::from_row_slice(2, 3, &[0.3, -0.2, 0.6, 0.1, 0.5, -0.4])
+                * f64::from(u8::from(feedthrough)),
             k: DMatrix::from_row_slice(2, 2, &[0.3, 0.1, -0.2, 0.4]),
             sample_time: 1.0,
         }
@@ -290,7 +291,7 @@ pub mod tests {
             let varx = varx_of(&truth, 5, feedthrough);
             let layout = ParameterLayout {
                 states: 2,
-                inputs: 1,
+                inputs: 3,
                 outputs: 2,
                 feedthrough,
             };
