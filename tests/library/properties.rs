@@ -278,6 +278,8 @@ fn as_many_samples_as_are_asked_for_suffice() {
         let options = Options {
             method,
             feedthrough,
+            // A covariance from blocks would ask for more.
+            polish: Polish::Always,
             ..fixed(1, *past)
         };
         let of = |samples: usize| identify(&[plant.record(samples, 2)], &options);
