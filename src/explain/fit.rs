@@ -210,8 +210,8 @@ impl Fit {
         best
     }
 
-    /// Steps at a fixed noise model while they help, number `held` left where it is. Derivatives serve several steps: near the optimum they hardly
-    /// change, and they are what costs.
+    /// Steps at a fixed noise model while they help, number `held` left where it is. Derivatives serve several steps: near
+    /// the optimum they hardly change, and they are what costs.
     fn descend(&mut self, problem: &Problem, noise: &Noise, effort: Effort, held: Option<usize>) {
         let bounds = self.structure.bounds();
         let mut damping = 1e-3;
