@@ -312,9 +312,10 @@ pub(crate) fn regimes(
         let edges: Vec<f64> = (0..=8)
             .map(|i| effects::level(&values, f64::from(i) / 8.0, |v| v))
             .collect();
+        let last = edges.len() - 2;
         for (eighth, pair) in edges.windows(2).enumerate() {
             // The ends are open: the edges are those of some samples, and a binary input stands on them.
-            let holds = |v: f64| (v >= pair[0] || eighth == 0) && (v < pair[1] || eighth == 7);
+            let holds = |v: f64| (v >= pair[0] || eighth == 0) && (v < pair[1] || eighth == last);
             let (mut inside, mut outside) = (Moments::default(), Moments::default());
             for ((v, e), keep) in values.iter().zip(&square).zip(&counts) {
                 if *keep {

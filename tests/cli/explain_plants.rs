@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use serde_json::Value;
 
-use crate::folder::{Folder, json};
+use crate::folder::{Folder, effects, json};
 
 /// Small steps a sample.
 const FINE: usize = 100;
@@ -63,15 +63,6 @@ fn said(sample_time: f64, u: &[f64], y: &[f64]) -> Value {
     json(&folder.join("explanation.json"))
 }
 
-fn ids(explanation: &Value) -> Vec<&str> {
-    explanation["effects"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|e| e["effect"].as_str().unwrap())
-        .collect()
-}
-
 /// Distance of a fitted parameter from the truth, in its standard deviations.
 fn distance(explanation: &Value, effect: usize, name: &str, truth: f64) -> f64 {
     let q = &explanation["effects"][effect]["parameters"][name];
@@ -125,7 +116,7 @@ fn tanks_that_do_not_overflow() {
     let u = levels(1, 0.8, 3.2, 30);
     let y = with_noise(&TANKS.run(&u, [3.0, 2.5]), 0.03, 2);
     let said = said(TANKS.sample_time, &u, &y);
-    assert_eq!(ids(&said), ["tank_outflow"], "{}", said["summary"]);
+    assert_eq!(effects(&said), ["tank_outflow"], "{}", said["summary"]);
     assert_eq!(said["effects"][0]["variant"], "two tanks");
     for (name, truth) in [
         ("pump_gain", TANKS.pump),
@@ -147,7 +138,7 @@ fn tanks_that_overflow() {
     let clean = tanks.run(&u, [3.0, 2.5]);
     let said = said(tanks.sample_time, &u, &with_noise(&clean, 0.03, 4));
     assert_eq!(
-        ids(&said),
+        effects(&said),
         ["tank_outflow", "overflow"],
         "{}",
         said["summary"]
@@ -184,7 +175,7 @@ fn one_tank() {
         })
         .collect();
     let said = said(tanks.sample_time, &u, &with_noise(&clean, 0.03, 6));
-    assert_eq!(ids(&said), ["tank_outflow"], "{}", said["summary"]);
+    assert_eq!(effects(&said), ["tank_outflow"], "{}", said["summary"]);
     assert_eq!(said["effects"][0]["variant"], "one tank");
     for (name, truth) in [("pump_gain", tanks.pump), ("outflow", tanks.outflow[1])] {
         let far = distance(&said, 0, name, truth);
@@ -213,7 +204,7 @@ fn a_linear_process_is_no_tank() {
         })
         .collect();
     let said = said(4.0, &u, &with_noise(&clean, 0.02, 8));
-    let ids = ids(&said);
+    let ids = effects(&said);
     assert!(
         !ids.contains(&"tank_outflow") && !ids.contains(&"overflow"),
         "{}",
@@ -255,7 +246,12 @@ fn a_drive_whose_sensor_loses_the_sign() {
     let u = levels(9, -2.0, 2.0, 12);
     let y: Vec<f64> = drive(&u, 0.0, 1.0).iter().map(|y| y.abs()).collect();
     let said = said(DRIVE_TIME, &u, &with_noise(&y, 0.02, 10));
-    assert_eq!(ids(&said), ["sensor_rectification"], "{}", said["summary"]);
+    assert_eq!(
+        effects(&said),
+        ["sensor_rectification"],
+        "{}",
+        said["summary"]
+    );
 }
 
 #[test]
@@ -264,7 +260,7 @@ fn a_drive_with_friction_whose_sensor_loses_the_sign() {
     let y: Vec<f64> = drive(&u, 0.2, 0.3).iter().map(|y| y.abs()).collect();
     let said = said(DRIVE_TIME, &u, &with_noise(&y, 0.02, 12));
     assert_eq!(
-        ids(&said),
+        effects(&said),
         ["sensor_rectification", "coulomb_friction"],
         "{}",
         said["summary"]
@@ -284,7 +280,7 @@ fn a_drive_that_stands_still_has_its_sign() {
     let y = drive(&u, 0.0, 1.0);
     let said = said(DRIVE_TIME, &u, &with_noise(&y, 0.02, 14));
     assert!(
-        !ids(&said).contains(&"sensor_rectification"),
+        !effects(&said).contains(&"sensor_rectification"),
         "{}",
         said["summary"]
     );

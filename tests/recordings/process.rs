@@ -5,17 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::folder::{Folder, columns, json};
+use crate::folder::{Folder, columns, effects, json};
 use crate::recordings;
-
-fn ids(explanation: &Value) -> Vec<&str> {
-    explanation["effects"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|e| e["effect"].as_str().unwrap())
-        .collect()
-}
 
 /// Root mean square of the difference of the outputs of two files, over rows `from..to`.
 fn error(simulated: &Path, recorded: &Path, rows: std::ops::Range<usize>) -> f64 {
@@ -92,7 +83,7 @@ fn cascaded_tanks() {
             "{simulation}: {}",
             said["summary"]
         );
-        assert_eq!(ids(&said), ["tank_outflow", "overflow"], "{simulation}");
+        assert_eq!(effects(&said), ["tank_outflow", "overflow"], "{simulation}");
         for effect in said["effects"].as_array().unwrap() {
             for (value, std) in numbers(effect) {
                 assert!(std > 0.0 && std < 0.3 * value.abs(), "{effect}");
@@ -149,7 +140,7 @@ fn coupled_drives() {
     let said = json(&folder.join("explanation.json"));
     assert_eq!(said["verdict"], "named", "{}", said["summary"]);
     assert_eq!(
-        ids(&said),
+        effects(&said),
         ["sensor_rectification", "coulomb_friction"],
         "{}",
         said["summary"]
@@ -193,5 +184,5 @@ fn dryer() {
         "{}",
         said["summary"]
     );
-    assert!(ids(&said).is_empty());
+    assert!(effects(&said).is_empty());
 }

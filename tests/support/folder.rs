@@ -125,6 +125,16 @@ pub fn json(path: &Path) -> Value {
     serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
 }
 
+/// Names of the effects of an explanation, in its order.
+pub fn effects(explanation: &Value) -> Vec<&str> {
+    explanation["effects"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|e| e["effect"].as_str().unwrap())
+        .collect()
+}
+
 /// The columns of a CSV file with a header.
 pub fn columns(text: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     let mut lines = text.lines();

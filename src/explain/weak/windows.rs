@@ -226,12 +226,12 @@ impl Windows {
             if windows.places.len() < LEAST_WINDOWS / 2 {
                 return None;
             }
-            let attenuation = windows.attenuation_by(data.sample_time, noise);
-            if attenuation.iter().all(|share| *share <= ATTENUATION) {
-                return Some(Self {
-                    attenuation,
-                    ..windows
-                });
+            if windows
+                .attenuation
+                .iter()
+                .all(|share| *share <= ATTENUATION)
+            {
+                return Some(windows);
             }
             half += half / 2;
         }
@@ -296,6 +296,7 @@ impl Windows {
         }
         windows.position = motion.position;
         windows.rate = motion.rate;
+        windows.attenuation = windows.attenuation_by(&kernels, noise);
         Some(windows)
     }
 
@@ -336,8 +337,7 @@ impl Windows {
     }
 
     /// By what share the sensor's noise lowers the coefficients of acceleration and rate, at most.
-    fn attenuation_by(&self, step: f64, noise: f64) -> [f64; 2] {
-        let kernels = Kernels::new(&self.bump, step, self.reading);
+    fn attenuation_by(&self, kernels: &Kernels, noise: f64) -> [f64; 2] {
         let energy = |kernel: &[f64]| noise * noise * kernel.iter().map(|w| w * w).sum::<f64>();
         let n = self.places.len().max(1) as f64;
         let moment = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / n;
