@@ -287,4 +287,61 @@ mod tests {
             rate(&Functionals::new(&other), &other)
         );
     }
+
+    /// Two states, three inputs of which the second only passes through and the third does nothing, two outputs.
+    fn continuous() -> (DMatrix<f64>, DMatrix<f64>, Plant) {
+        let h = 0.2;
+        let a = DMatrix::from_row_slice(2, 2, &[-0.3, 1.0, -4.0, -0.8]);
+        let b = DMatrix::from_row_slice(2, 3, &[0.2, 0.0, 0.0, 1.5, 0.0, 0.0]);
+        let mut both = DMatrix::zeros(5, 5);
+        both.view_mut((0, 0), (2, 2)).copy_from(&(&a * h));
+        both.view_mut((0, 2), (2, 3)).copy_from(&(&b * h));
+        let held = crate::linalg::exponential(&both);
+        let plant = Plant {
+            states: 2,
+            inputs: 3,
+            outputs: 2,
+            a: row_major(&held.view((0, 0), (2, 2)).into_owned()),
+            b: row_major(&held.view((0, 2), (2, 3)).into_owned()),
+            c: vec![1.0, 0.3, -0.5, 2.0],
+            d: vec![0.0, 0.0, 0.0, 0.0, 0.7, 0.0],
+            sample_time: h,
+        };
+        (a, b, plant)
+    }
+
+    #[test]
+    fn rows_are_those_of_the_continuous_plant() {
+        let (a, b, plant) = continuous();
+        let c = plant.c_matrix();
+        let found = Derivatives::new(&plant);
+        let close = |rows: &[Vec<f64>], wanted: DMatrix<f64>| {
+            assert_eq!(rows.len(), wanted.nrows());
+            for (row, wanted) in rows.iter().zip(wanted.row_iter()) {
+                assert_eq!(row.len(), wanted.len());
+                for (found, wanted) in row.iter().zip(wanted.iter()) {
+                    assert!((found - wanted).abs() < 1e-10, "{found} {wanted}");
+                }
+            }
+        };
+        close(&found.rate, &c * &a);
+        close(&found.rate_feedthrough, &c * &b);
+        close(
+            &found.integral.unwrap(),
+            &c * a.clone().try_inverse().unwrap(),
+        );
+        let half = crate::linalg::exponential(&(&a * (0.5 * plant.sample_time)));
+        let moment = half * &a * &b * -plant.sample_time.powi(2);
+        close(&found.moment, moment.transpose());
+    }
+
+    #[test]
+    fn inputs_that_do_something_are_free() {
+        let mut plant = continuous().2;
+        for i in 0..2 {
+            plant.b[3 * i + 1] = 0.0;
+            plant.b[3 * i + 2] = 0.0;
+        }
+        assert_eq!(Coordinates::new(&plant).active_inputs, [0, 1]);
+    }
 }

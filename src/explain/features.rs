@@ -329,7 +329,9 @@ mod tests {
     fn play_is_carried_along() {
         let x: Vec<f64> = (0..200).map(|k| (0.1 * f64::from(k)).sin()).collect();
         let size = effects::level(&x, 0.8, f64::abs);
-        for (share, play) in PLAYS.into_iter().zip(plays(std::slice::from_ref(&x))) {
+        let all = plays(std::slice::from_ref(&x));
+        assert_eq!(all.len(), PLAYS.len());
+        for (share, play) in PLAYS.into_iter().zip(all) {
             let gap = share * size;
             for k in 1..x.len() {
                 let (held, before) = (play[0][k], play[0][k - 1]);

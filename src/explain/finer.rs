@@ -151,4 +151,43 @@ mod tests {
         let gain = 0.3 * share.direction[0] + share.direction[1];
         assert!((share.rate_gain - gain).abs() < 1e-15);
     }
+
+    /// A force that grows with time, summed by a plant that only sums: a step sees the time at which it begins.
+    #[test]
+    fn time_runs_in_fine_steps() {
+        let plant = Plant {
+            states: 1,
+            a: vec![1.0],
+            b: vec![0.0],
+            c: vec![1.0],
+            ..fixtures::plant()
+        };
+        let (steps, h, start) = (4, fixtures::SAMPLE_TIME, 3.0);
+        let force = ActiveForce {
+            law: |_, motion, _| motion.clock.time(motion.sample),
+            parameters: Vec::new(),
+            position: vec![1.0],
+            rate: vec![1.0],
+            rate_feedthrough: vec![0.0],
+            direction: vec![1.0],
+            rate_gain: 1.0,
+            input: 0,
+        };
+        let clock = Clock {
+            start,
+            step: h,
+            fresh: false,
+        };
+        let found = Finer::new(&plant, steps)
+            .unwrap()
+            .run(&plant, &[force], &[0.0], &[vec![0.0; 20]], 20, &clock)
+            .unwrap();
+        let mut sum = 0.0;
+        for (k, y) in found[0].iter().enumerate() {
+            assert!((y - sum).abs() < 1e-9, "{k}: {y} {sum}");
+            for i in 0..steps {
+                sum += (start + h * (k as f64 + i as f64 / steps as f64)) / steps as f64;
+            }
+        }
+    }
 }

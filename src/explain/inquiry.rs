@@ -35,6 +35,9 @@ const LAW_IMPERFECTION: f64 = 0.02;
 /// Share of the innovation variance that rounding to levels must make up to be named.
 const COARSE: f64 = 0.25;
 
+/// Share from which nothing else is looked for: rounding would be taken for anything.
+const MOSTLY_COARSE: f64 = 0.3;
+
 /// A rival of the answer.
 #[derive(Debug, Clone)]
 pub(crate) struct Rival {
@@ -131,8 +134,7 @@ pub(crate) fn inquire(
         detectable: Vec::new(),
         weak: None,
     };
-    let dominated = coarse.is_some_and(|(_, _, share)| share > 0.5);
-    if dominated || coarse.is_some_and(|c| c.2 > 0.3) {
+    if coarse.is_some_and(|(_, _, share)| share > MOSTLY_COARSE) {
         // Rounding is most of what is left: it is the answer, and its error would be taken for anything.
         finding.verdict = Verdict::Named;
         finding.model = finding.boring.near.clone();
@@ -378,4 +380,38 @@ pub(crate) fn polished(problem: &Problem, fit: &Fit) -> Fit {
     fit.improved(problem, Effort::FINAL)
         .filter(|better| better.deviance < fit.deviance)
         .unwrap_or_else(|| fit.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::fixtures::{NOISE, recorded, spring};
+
+    #[test]
+    fn a_lattice_is_told_of_where_rounding_is_much_of_what_is_left() {
+        let structure = spring(Vec::new());
+        let clean = recorded(&structure, &[], 3);
+        for step in [0.0, 0.02, 0.2, 0.4] {
+            let mut data = clean.clone();
+            if step > 0.0 {
+                for y in &mut data.segments[0].outputs[0] {
+                    *y = (*y / step).round() * step;
+                }
+            }
+            let problem = Problem::new(&data);
+            let fit = Fit::at(&problem, structure.clone(), Vec::new()).unwrap();
+            let rounding = step * step / 12.0;
+            let expected = rounding / (rounding + NOISE * NOISE);
+            match coarse_sensor(&problem, &fit) {
+                None => assert!(expected < COARSE, "{step}"),
+                Some((output, found, share)) => {
+                    assert!(expected > COARSE && output == 0, "{step}");
+                    assert!((found / step - 1.0).abs() < 1e-6, "{found}");
+                    // A coarse lattice takes some of the noise with it.
+                    let ratio = share / expected;
+                    assert!((0.85..1.25).contains(&ratio), "{step}: {ratio}");
+                }
+            }
+        }
+    }
 }

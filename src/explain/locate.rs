@@ -523,4 +523,47 @@ mod tests {
         assert_eq!(times(1e9, 0.0), MOST_TIMES);
         assert_eq!(times(6.0, 2.0), 3.0);
     }
+
+    #[test]
+    fn ends_without_excess_are_cut_off() {
+        let squares: Vec<f64> = (0..100)
+            .map(|k| if (40..60).contains(&k) { 6.0 } else { 1.0 })
+            .collect();
+        let running = |values: &[f64]| -> Vec<f64> {
+            std::iter::once(0.0)
+                .chain(values.iter().scan(0.0, |sum, v| {
+                    *sum += v;
+                    Some(*sum)
+                }))
+                .collect()
+        };
+        let (sums, counts) = (running(&squares), running(&[1.0; 100]));
+        assert_eq!(trimmed(&sums, &counts, 30, 70), (40, 60));
+        assert_eq!(trimmed(&sums, &counts, 0, 30), (0, 30));
+    }
+
+    #[test]
+    fn a_picture_stands_at_the_middle_of_its_bins() {
+        let n = 400;
+        let flat: Vec<(f64, f64)> = (0..n).map(|i| (0.01 * i as f64, 1.0)).collect();
+        let picture = spectrum_picture(&flat, &flat);
+        assert!((picture[0][0] - 0.015).abs() < 1e-12, "{:?}", picture[0]);
+        assert!(picture.windows(2).all(|p| p[0][0] < p[1][0]));
+        let last = picture[picture.len() - 1][0];
+        assert!(3.9 < last && last < 3.99, "{last}");
+    }
+
+    /// Student's t of 1.6740449 with 5.2040960 degrees of freedom, integrated by Simpson's rule.
+    #[test]
+    fn means_are_compared_by_welch() {
+        let of = |values: &[f64]| {
+            let mut moments = Moments::default();
+            values.iter().for_each(|v| moments.add(*v));
+            moments
+        };
+        let welch = 0.076_338_388_174_6;
+        let (a, b) = (of(&[1.0, 4.0, 2.0, 7.0, 5.0]), of(&[2.0, 1.0, 3.0, 1.5]));
+        assert!((a.exceeds(&b) - welch).abs() < 1e-9, "{}", a.exceeds(&b));
+        assert!((b.exceeds(&a) - (1.0 - welch)).abs() < 1e-9);
+    }
 }

@@ -508,4 +508,21 @@ mod tests {
         let literal = squares + 3000.0 * (2.0 * noise.scale[0].ln() + std::f64::consts::TAU.ln());
         assert!((noise.deviance(&series, &mask) - literal).abs() < 1e-8);
     }
+
+    #[test]
+    fn filters_of_every_order_are_the_literal_sum() {
+        let v: Vec<f64> = (0..45).map(|k| f64::from(k * k % 17) - 7.0).collect();
+        let all = [-0.9, 0.5, 0.3, -0.7, 0.2, 0.11, -0.4, 0.6];
+        for order in 0..=MOST_ORDER {
+            for n in [0, 1, order, order + 1, 20, 45] {
+                let found = filter(&all[..order], &v[..n], 1.7);
+                assert_eq!(found.len(), n);
+                for k in 0..n {
+                    let past: f64 = (0..order.min(k)).map(|i| all[i] * v[k - 1 - i]).sum();
+                    let wanted = 1.7 * (v[k] + past);
+                    assert!((found[k] - wanted).abs() < 1e-12, "{order} {n} {k}");
+                }
+            }
+        }
+    }
 }

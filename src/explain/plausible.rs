@@ -255,12 +255,14 @@ fn share_beyond(problem: &Problem, fit: &Fit, index: usize, unit: Unit, v: f64) 
     Some(beyond / values.len().max(1) as f64)
 }
 
+/// Output `o` of every segment.
+fn simulated<'a>(problem: &Problem, fit: &'a Fit, o: usize) -> impl Iterator<Item = &'a Vec<f64>> {
+    fit.simulated.iter().skip(o).step_by(problem.data.outputs)
+}
+
 /// Output `o` summed over time: the position that belongs to a speed.
 fn integrated(problem: &Problem, fit: &Fit, o: usize) -> Vec<f64> {
-    fit.simulated
-        .iter()
-        .skip(o)
-        .step_by(problem.data.outputs)
+    simulated(problem, fit, o)
         .flat_map(|y| {
             y.iter().scan(0.0, |at, v| {
                 *at += v * problem.data.sample_time;
@@ -272,10 +274,11 @@ fn integrated(problem: &Problem, fit: &Fit, o: usize) -> Vec<f64> {
 
 /// Half the range of the position that effect `index` looks at, as far as outputs tell.
 pub(crate) fn travel(problem: &Problem, fit: &Fit, index: usize) -> f64 {
-    let of = |y: &[f64]| effects::level(y, 0.95, f64::abs);
-    match fit.structure.effects[index].signal {
-        Signal::Output(o) => of(&fit.simulated[o]),
-        Signal::Difference(i, j) => of(&fit.simulated[i]) + of(&fit.simulated[j]),
-        Signal::Integral(o) => of(&integrated(problem, fit, o)),
-    }
+    let all = |o: usize| simulated(problem, fit, o).flatten().copied();
+    let position: Vec<f64> = match fit.structure.effects[index].signal {
+        Signal::Output(o) => all(o).collect(),
+        Signal::Difference(i, j) => all(i).zip(all(j)).map(|(a, b)| a - b).collect(),
+        Signal::Integral(o) => integrated(problem, fit, o),
+    };
+    effects::level(&position, 0.95, f64::abs)
 }

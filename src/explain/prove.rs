@@ -207,6 +207,7 @@ fn improvement(
 mod tests {
     use super::*;
     use crate::explain::data::Segment;
+    use rand_distr::StandardNormal;
 
     const N: usize = 2000;
 
@@ -292,5 +293,31 @@ mod tests {
         });
         assert!((error.unwrap() - 5.0_f64.sqrt()).abs() < 1e-12);
         assert!(across_halves(&mask, |own| own[0][0].then(|| vec![vec![0.0; N]])).is_none());
+    }
+
+    /// Of errors that are white, half of a size less: the gain's deviation is the root of `(1 + 1/4) / 2N`.
+    #[test]
+    fn improvements_are_as_certain_as_white_errors_allow() {
+        let n = 20_000;
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut white = |size: f64| -> Series {
+            vec![
+                (0..n)
+                    .map(|_| size * random.sample::<f64, _>(StandardNormal))
+                    .collect(),
+            ]
+        };
+        let (before, after) = (white(1.0), white(0.5));
+        let of = Steps {
+            simulation: &before,
+            parameters_only: &before,
+            augmented: &after,
+            structure_share: 0.0,
+        };
+        let [low, high] = improvement(&of, &vec![vec![true; n]], 1, 0, 9).unwrap();
+        let expected = 2.0 * 1.96 * (1.25 / (2.0 * n as f64)).sqrt();
+        let ratio = (high - low) / expected;
+        assert!((0.6..1.4).contains(&ratio), "{ratio}");
+        assert!(low < 0.5 && 0.5 < high, "{low} {high}");
     }
 }

@@ -300,3 +300,30 @@ fn with_friction(problem: &Problem, fit: &Fit, friction: &'static Definition) ->
     theta.push((KNEE * speed).max(friction.parameters[0].lower).ln());
     fitted(problem, structure, theta)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::fixtures::{NOISE, SAMPLES, recorded, spring};
+
+    #[test]
+    fn the_plant_behind_is_judged_by_what_the_sensor_reads() {
+        let mut data = recorded(&spring(Vec::new()), &[], 2);
+        let sign = vec![data.segments[0].outputs[0].clone()];
+        data.segments[0].outputs[0]
+            .iter_mut()
+            .for_each(|y| *y = y.abs());
+        let noise = SAMPLES as f64 * NOISE * NOISE;
+        let least = |sign: &Series| {
+            identified(&data, 2, sign)
+                .into_iter()
+                .map(|(error, _, _)| error)
+                .fold(f64::INFINITY, f64::min)
+        };
+        let right = least(&sign);
+        assert!((0.8..1.3).contains(&(right / noise)), "{right} {noise}");
+        // Without signs it is another plant.
+        let wrong = least(&vec![vec![1.0; SAMPLES]]);
+        assert!(wrong > 1.6 * noise, "{wrong} {noise}");
+    }
+}

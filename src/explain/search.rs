@@ -422,3 +422,38 @@ pub(crate) fn second_effects(
         .collect();
     pursued(problem, jobs, PROMISING_SECONDS)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::fixtures::{SAMPLE_TIME, effect, recorded, spring};
+
+    /// A gain that changes in the middle, looked for from some seconds away: no slope leads there.
+    #[test]
+    fn the_time_of_a_change_is_found_from_afar() {
+        let changed = spring(vec![effect("gain_change", "")]);
+        assert_eq!(change_time(&changed), Some(1));
+        assert_eq!(change_time(&spring(Vec::new())), None);
+        let truth = [2.0, 40.03];
+        for (seed, start) in [44.0, 38.0, 36.5].into_iter().enumerate() {
+            let data = recorded(&changed, &truth, seed as u64);
+            let problem = Problem::new(&data);
+            let begin = vec![0.1, start];
+            let fit = fit_lead(&problem, changed.clone(), begin.clone(), Effort::FINAL).unwrap();
+            // As good as one that begins at the truth; noise moves the time by some samples.
+            let run = |from| Fit::run(&problem, changed.clone(), from, None, Effort::FINAL);
+            let best = run(truth.to_vec()).unwrap();
+            assert!(
+                fit.deviance < best.deviance + 0.5,
+                "{:?} {:?}",
+                fit.theta,
+                best.theta
+            );
+            let off = (fit.theta[1] - truth[1]) / SAMPLE_TIME;
+            assert!(off.abs() < 4.0, "{:?}", fit.theta);
+            // No scan makes it worse than it was.
+            let unscanned = run(begin).unwrap();
+            assert!(fit.deviance <= unscanned.deviance + 1e-9);
+        }
+    }
+}

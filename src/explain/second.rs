@@ -220,7 +220,13 @@ pub(crate) fn look_alikes(a: &str, b: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::explain::coordinates::Coordinates;
+    use crate::explain::fixtures::{self, SAMPLES, recorded, spring};
+    use crate::explain::plant::Plant;
+    use crate::explain::structure::Structure;
 
     #[test]
     fn a_second_effect_must_bring_a_share_of_the_first() {
@@ -239,6 +245,42 @@ mod tests {
                     crate::explain::effects::library().any(|d| d.id == *id),
                     "{id}"
                 );
+            }
+        }
+    }
+
+    /// What passes through shows, a plant without is left without, and a simulation that was given is not asked.
+    #[test]
+    fn a_feedthrough_is_freed_where_there_is_one() {
+        let gains = [0.0, 0.3];
+        for (seed, gain) in gains.into_iter().enumerate() {
+            for constant in [true, false] {
+                let mut data = recorded(&spring(Vec::new()), &[], seed as u64);
+                let segment = &mut data.segments[0];
+                for (y, u) in segment.outputs[0].iter_mut().zip(&segment.inputs[0]) {
+                    *y += gain * u;
+                }
+                let mut structure = Structure {
+                    plant_free: true,
+                    ..spring(Vec::new())
+                };
+                if constant {
+                    // An operating point enters as an input that is one.
+                    data.constant = true;
+                    data.inputs = 2;
+                    data.segments[0].inputs.push(vec![1.0; SAMPLES]);
+                    structure.coordinates = Arc::new(Coordinates::new(&Plant {
+                        inputs: 2,
+                        b: vec![0.005, 0.001, 0.09, 0.002],
+                        d: vec![0.0; 2],
+                        ..fixtures::plant()
+                    }));
+                }
+                let problem = Problem::new(&data);
+                let start = structure.given();
+                let fit = Fit::run(&problem, structure, start, None, Effort::FINAL).unwrap();
+                let freed = with_feedthrough(&problem, &fit);
+                assert_eq!(freed.is_some(), gain > 0.0 && constant, "{gain} {constant}");
             }
         }
     }

@@ -255,8 +255,8 @@ fn trimmed(data: &mut Data) {
             continue;
         }
         let mut best = (f64::NEG_INFINITY, 0);
-        let mut from = 0;
-        while from + most <= n {
+        let last = n - most;
+        for from in (0..last).step_by(most / 4).chain([last]) {
             let size: f64 = segment
                 .outputs
                 .iter()
@@ -270,7 +270,6 @@ fn trimmed(data: &mut Data) {
             if size > best.0 * 1.01 {
                 best = (size, from);
             }
-            from += most / 4;
         }
         for channel in segment.inputs.iter_mut().chain(&mut segment.outputs) {
             *channel = channel[best.1..best.1 + most].to_vec();

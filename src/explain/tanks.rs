@@ -414,3 +414,66 @@ pub(crate) fn prior(data: &Data, fit: &Fit) -> Option<StatePrior> {
         error_std: variance.sqrt(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::cascade::Losses;
+    use crate::explain::data::Segment;
+
+    /// A pump of flow 0.5 a volt, and 1 at none, that stands still below -2.
+    fn still(share: f64) -> bool {
+        let n = 400;
+        let inputs: Vec<f64> = (0..n)
+            .map(|k| {
+                if (k as f64) < share * n as f64 {
+                    -3.0
+                } else {
+                    2.0
+                }
+            })
+            .collect();
+        let data = Data {
+            segments: vec![Segment {
+                inputs: vec![inputs],
+                outputs: vec![vec![1.0; n]],
+                start_time: 0.0,
+            }],
+            sample_time: 1.0,
+            inputs: 1,
+            outputs: 1,
+            constant: false,
+        };
+        let parts = Parts {
+            law: Law::Root,
+            upper_overflow: false,
+            lower_overflow: false,
+            constant_inflow: false,
+            pump_bias: true,
+        };
+        let found = CascadeFit {
+            cascade: Cascade {
+                parts,
+                numbers: [0.5, 0.1, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0],
+            },
+            deviations: [0.0; 8],
+            initial: vec![[1.0; 2]],
+            error: 0.1,
+            count: n,
+            free: 4,
+            losses: Losses {
+                outflow: 100.0,
+                overflow: 0.0,
+                upper_overflow: 0.0,
+                exchange: f64::INFINITY,
+            },
+        };
+        idles(&data, &found)
+    }
+
+    #[test]
+    fn a_pump_that_stands_still_most_of_the_time_is_none() {
+        assert!(!still(0.0) && !still(0.9 * MOST_IDLE));
+        assert!(still(1.1 * MOST_IDLE) && still(0.5));
+    }
+}

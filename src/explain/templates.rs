@@ -65,18 +65,13 @@ impl Bench<'_> {
         let change_times = (1..CHANGE_TIMES)
             .map(|i| first.start_time + length * i as f64 / CHANGE_TIMES as f64)
             .collect();
-        // From a few periods in the recording to most of the band.
-        let (low, high) = (5.0 / length, 0.45 / step);
-        let frequencies = (0..MODE_FREQUENCIES)
-            .map(|i| low * (high / low).powf(i as f64 / (MODE_FREQUENCIES - 1) as f64))
-            .collect();
         Observed {
             channel,
             rate,
             step,
             change_times,
             lines: lines.to_vec(),
-            frequencies,
+            frequencies: mode_frequencies(length, step),
         }
     }
 
@@ -378,5 +373,33 @@ impl Bench<'_> {
                 }
             })
             .collect()
+    }
+}
+
+/// From a few periods in the recording to most of the band, in steps of one ratio.
+fn mode_frequencies(length: f64, step: f64) -> Vec<f64> {
+    let (low, high) = (5.0 / length, 0.45 / step);
+    (0..MODE_FREQUENCIES)
+        .map(|i| low * (high / low).powf(i as f64 / (MODE_FREQUENCIES - 1) as f64))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn modes_are_looked_for_in_the_band() {
+        let found = mode_frequencies(40.0, 0.01);
+        assert_eq!(found.len(), MODE_FREQUENCIES);
+        assert!((found[0] - 0.125).abs() < 1e-12);
+        assert!((found[MODE_FREQUENCIES - 1] - 45.0).abs() < 1e-9);
+        let ratio = found[1] / found[0];
+        assert!(ratio > 1.0);
+        assert!(
+            found
+                .windows(2)
+                .all(|f| (f[1] / f[0] / ratio - 1.0).abs() < 1e-9)
+        );
     }
 }

@@ -211,3 +211,32 @@ fn effective(series: &[f64]) -> f64 {
         .sum();
     n as f64 / (1.0 + 2.0 * sum.max(0.0))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+
+    /// White errors count each; of an autoregression with coefficient a it is (1 - a^2) / (1 + a^2) of them.
+    #[test]
+    fn correlated_errors_count_less() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+        let n = 20_000;
+        for a in [0.0, 0.5, 0.9] {
+            let mut state = 0.0;
+            let series: Vec<f64> = (0..n)
+                .map(|_| {
+                    state = a * state + random.sample::<f64, _>(StandardNormal);
+                    state
+                })
+                .collect();
+            let expected = (1.0 - a * a) / (1.0 + a * a);
+            let found = effective(&series) / n as f64;
+            assert!(
+                (found / expected - 1.0).abs() < 0.15,
+                "{a}: {found} {expected}"
+            );
+        }
+    }
+}

@@ -105,6 +105,16 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_past_takes_a_tenth_of_the_samples_at_most() {
+        assert_eq!(longest_past(2100, 2, 1000), 100);
+        assert_eq!(longest_past(2099, 2, 1000), 99);
+        assert_eq!(
+            (longest_past(5, 3, 100), longest_past(9_000_000, 2, 100)),
+            (1, 100)
+        );
+    }
+
+    #[test]
     fn the_future_is_long_enough_for_the_order() {
         // Half the past; ten; or twice what observability asks for. Never more than the past.
         assert_eq!(future_for_order(60, 2, 5), 30);

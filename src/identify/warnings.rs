@@ -232,3 +232,63 @@ pub fn not_converged() -> String {
      because the order is too high; compare lower orders with --order"
         .to_owned()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Pole;
+    use num_complex::Complex64;
+
+    fn pole(re: f64, im: f64, radial_std: f64) -> PoleUncertainty {
+        let value = Complex64::new(re, im);
+        let (c, s) = (re / value.norm(), im / value.norm());
+        // Uncertain along the radius alone.
+        let v = radial_std * radial_std;
+        PoleUncertainty {
+            pole: Pole {
+                value,
+                natural_frequency: 1.0,
+                damping: None,
+                time_constant: None,
+            },
+            covariance: Some([[v * c * c, v * c * s], [v * c * s, v * s * s]]),
+            natural_frequency_std: None,
+            damping_std: None,
+            time_constant_std: None,
+        }
+    }
+
+    #[test]
+    fn poles_that_may_lie_on_the_circle_are_told_of() {
+        let distance = 1e-3;
+        let (re, im) = (0.6 * (1.0 - distance), 0.8 * (1.0 - distance));
+        let close = distance / CLOSE_TO_THE_CIRCLE;
+        assert!(of_poles(&[pole(re, im, 0.9 * close)]).is_empty());
+        let told = of_poles(&[pole(re, im, 1.1 * close), pole(re, -im, 1.1 * close)]);
+        assert_eq!(told.len(), 1, "one of a pair");
+        assert!(told[0].contains("undamped resonance"), "{}", told[0]);
+        let told = of_poles(&[pole(1.0 - distance, 0.0, 1.1 * close)]);
+        assert!(told[0].contains("an integrator"), "{told:?}");
+        // Outside it is unstable, and said so elsewhere.
+        assert!(of_poles(&[pole(1.001, 0.0, 1.0)]).is_empty());
+    }
+
+    #[test]
+    fn rounding_is_told_of_where_it_matters() {
+        let channel = |bias: f64| CoarseChannel {
+            channel: "flow".to_owned(),
+            step: 0.25,
+            bias,
+        };
+        let told = of_rounding(
+            &[
+                channel(0.9 * WORTH_A_WARNING),
+                channel(3.0 * WORTH_A_WARNING),
+            ],
+            "if so",
+        );
+        assert_eq!(told.len(), 1);
+        assert!(told[0].contains("flow was recorded in steps of 0.25"));
+        assert!(told[0].contains("up to 3 standard"), "{}", told[0]);
+    }
+}

@@ -182,6 +182,29 @@ fn orders_are_chosen_with_every_method() {
     }
 }
 
+/// A window shows one order less than it has rows of outputs.
+#[test]
+fn an_order_that_the_window_cannot_show_is_refused() {
+    let log = systems::knudsen_armax().record(600, 2);
+    for past in [4, 5] {
+        for (order, possible) in [(past - 1, true), (past, false)] {
+            let options = Options {
+                past: Some(past),
+                polish: Polish::Never,
+                ..options(Method::Subid, order)
+            };
+            match identify(std::slice::from_ref(&log), &options) {
+                Ok(model) => assert!(possible && model.system.states() == order),
+                Err(error) => {
+                    let said = error.to_string();
+                    assert!(!possible, "{said}");
+                    assert!(said.contains(&(past - 1).to_string()), "{said}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn the_command_line_takes_the_names_and_the_document_gives_them() {
     let folder = Folder::new();

@@ -44,8 +44,21 @@ fn log(name: &str, input: Vec<f64>, outputs: Vec<Vec<f64>>) -> Log {
     }
 }
 
-/// What is said of the plant with white noise and what `change` does to its outputs (`output`, `sample`).
+/// What is said of the plant with white noise and what `change` does to its outputs.
 fn said(seed: u64, change: impl Fn(&mut [Vec<f64>])) -> Explanation {
+    explained(seed, |_| (), change)
+}
+
+/// What is said of the plant with white noise when `change` is made of the input on its way to it.
+fn said_of(seed: u64, change: impl Fn(&mut [f64])) -> Explanation {
+    explained(seed, change, |_| ())
+}
+
+fn explained(
+    seed: u64,
+    before: impl Fn(&mut [f64]),
+    behind: impl Fn(&mut [Vec<f64>]),
+) -> Explanation {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut white = |size: f64| -> Vec<f64> {
         (0..SAMPLES)
@@ -54,13 +67,15 @@ fn said(seed: u64, change: impl Fn(&mut [Vec<f64>])) -> Explanation {
     };
     let input = white(4.0);
     let simulated = plant().simulate(&[&input], None).unwrap();
-    let mut recorded = simulated.clone();
+    let mut effective = input.clone();
+    before(&mut effective);
+    let mut recorded = plant().simulate(&[&effective], None).unwrap();
     for column in &mut recorded {
         for (y, e) in column.iter_mut().zip(white(NOISE)) {
             *y += e;
         }
     }
-    change(&mut recorded);
+    behind(&mut recorded);
     let simulation = Simulation::Outputs(vec![log("simulation", input.clone(), simulated)]);
     explain(
         &[log("recording", input, recorded)],
@@ -119,6 +134,9 @@ fn amplitudes_at_each_output_are_as_certain_as_white_noise_allows() {
         assert_eq!(found.effect, "periodic_disturbance");
         // The output that shows it most, over its noise.
         assert_eq!(found.signal, "b");
+        // What is there all the time is the same in either half: the farthest of a few numbers.
+        let apart = found.evidence.halves_disagree.unwrap();
+        assert!(apart < 4.5, "{apart}");
         for (name, truth) in [("amplitude_a", 0.03), ("amplitude_b", 0.06)] {
             let amplitude = &found.parameters[name];
             let std = amplitude.std.unwrap();
@@ -131,4 +149,26 @@ fn amplitudes_at_each_output_are_as_certain_as_white_noise_allows() {
     }
     // Chi-squared with 8 degrees of freedom: between its quantiles 0.1 % and 99.9 %.
     assert!((0.86..26.2).contains(&squares), "{squares}");
+}
+
+#[test]
+fn what_begins_at_some_time_is_not_compared_across_halves() {
+    let begins = 500;
+    let answer = said_of(2, |u| {
+        u[begins..].iter_mut().for_each(|u| *u *= 1.3);
+    });
+    assert_eq!(answer.verdict, Verdict::Named, "{:?}", answer.summary);
+    let found = &answer.effects[0];
+    assert_eq!(found.effect, "gain_change");
+    assert_eq!(found.signal, "u");
+    assert_eq!(found.evidence.halves_disagree, None);
+    let from = START + SAMPLE_TIME * begins as f64;
+    let time = &found.parameters["from"];
+    assert!((time.value - from).abs() < SAMPLE_TIME, "{time:?}");
+    let change = &found.parameters["change"];
+    let std = change.std.unwrap();
+    assert!(
+        (change.value - 0.3).abs() < 4.0 * std && std < 0.01,
+        "{change:?}"
+    );
 }

@@ -2,10 +2,11 @@
 //! freedom, in which a weak state hardly shows.
 
 use innovant::identify::{OrderEvidence, identify};
-use innovant::systems::TestSystem;
+use innovant::systems::{TestSystem, two_by_two};
 use innovant::{Model, Options};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// A slow pole, and an alternating one that answers `weak` times as strongly.
 fn two_poles(weak: f64) -> TestSystem {
@@ -72,4 +73,43 @@ fn modes_that_only_noise_has_are_dropped() {
     .collect();
     let high = orders.iter().filter(|order| **order > 2).count();
     assert!(high <= 2, "{orders:?}");
+}
+
+/// With several outputs: the test of the model is that of its order, and Schwarz's criterion counts `n (r + 2 l)` numbers.
+#[test]
+fn evidence_on_orders_is_of_one_piece() {
+    let log = two_by_two().record(2000, 3);
+    // The window's residual has its own degrees of freedom for each output: F has a tail that chi-square has not.
+    let options = Options {
+        past: Some(12),
+        ..Options::default()
+    };
+    let model = identify(&[log], &options).unwrap();
+    let diagnostics = &model.summary.as_ref().unwrap().diagnostics;
+    let test = diagnostics.order_test.as_ref().unwrap();
+    let chosen = evidence(&model, model.system.states()).unwrap();
+    assert_eq!(test.p_value, chosen.p_value);
+    assert_eq!(test.chi_square, chosen.chi_square.unwrap());
+    let (inputs, outputs) = (2, 2);
+    let columns = diagnostics.windows as f64;
+    let freedom = columns - 12.0 * (inputs + outputs) as f64;
+    let mut asked = 0;
+    for entry in &diagnostics.orders {
+        let (Some(cost), Some(schwarz)) = (entry.chi_square, entry.schwarz) else {
+            continue;
+        };
+        asked += 1;
+        let numbers = (schwarz - cost) / columns.ln();
+        let expected = (entry.order * (inputs + 2 * outputs)) as f64;
+        assert!((numbers / expected - 1.0).abs() < 1e-9, "{entry:?}");
+        let d = entry.degrees_of_freedom.unwrap();
+        assert_eq!(d, outputs * 12 * (inputs + outputs) - expected as usize);
+        let law = FisherSnedecor::new(d as f64, outputs as f64 * freedom).unwrap();
+        let p = law.sf(cost / d as f64);
+        assert!(
+            (entry.p_value.unwrap() - p).abs() < 1e-3 * p + 1e-12,
+            "{entry:?} {p}"
+        );
+    }
+    assert!(asked >= 2, "{asked}");
 }

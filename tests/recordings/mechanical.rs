@@ -69,6 +69,9 @@ fn is_the_drive(said: &Explanation, fresh: &Log) {
     let friction = said.effects[0].parameters["friction_force"].clone();
     assert!((friction.value / 20.4 - 1.0).abs() < 0.05, "{friction:?}");
     assert!(friction.std.is_some_and(|s| s < 1.0), "{friction:?}");
+    // Other laws were asked, and are far behind.
+    let rival = &said.alternatives[0];
+    assert!(rival.support < 0.9, "{rival:?}");
     let mechanics = said.model.mechanics.as_ref().unwrap();
     assert!((mechanics.mass.value / 95.0 - 1.0).abs() < 0.03);
     assert!((mechanics.viscous_friction.value / 203.0 - 1.0).abs() < 0.05);

@@ -43,6 +43,8 @@ mod tests;
 
 use std::ops::{Add, Mul, Sub};
 
+#[cfg(test)]
+pub(crate) use select::Losses;
 pub(crate) use select::{CascadeFit, fit};
 
 /// The numbers of a cascade, by what they are.

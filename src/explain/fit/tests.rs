@@ -235,3 +235,17 @@ fn updated_derivatives_foretell_the_step_that_was_made() {
     let kept = (after - before) * &across;
     assert!(kept.norm() < 1e-9 * change.norm());
 }
+
+/// A secant spans what a number is uncertain by, not its size: where the law is smooth it is the slope there.
+#[test]
+fn secants_of_a_smooth_law_are_its_slopes() {
+    let data = recording(2);
+    let problem = Problem::new(&data);
+    let mut fit = Fit::at(&problem, structure(), truth()).unwrap();
+    for (i, slope) in fit.sensitivities(&problem).into_iter().enumerate() {
+        let (slope, secant) = (slope.unwrap(), fit.secant(&problem, i).unwrap());
+        let apart = sum_of_squares(&difference(&secant, &slope)[0]).sqrt();
+        let size = sum_of_squares(&slope[0]).sqrt();
+        assert!(apart < 0.1 * size, "{i}: {}", apart / size);
+    }
+}

@@ -1,5 +1,9 @@
+use std::sync::Arc;
+
 use super::*;
-use crate::explain::fixtures::{SAMPLE_TIME, SAMPLES, effect, recorded, spring};
+use crate::explain::coordinates::Coordinates;
+use crate::explain::fixtures::{self, SAMPLE_TIME, SAMPLES, effect, recorded, spring};
+use crate::explain::plant::Plant;
 use crate::explain::structure::{Instance, Structure};
 
 /// Seconds of a recording.
@@ -220,4 +224,45 @@ fn other_parameters_must_not_do_significantly_better() {
             assert!(plant_may_stay(&ranked(fit), &[ranked(&free)]));
         },
     );
+}
+
+/// Two outputs, two recordings of which the second moves three times as far.
+#[test]
+fn travel_is_that_of_all_recordings() {
+    let plant = Plant {
+        outputs: 2,
+        c: vec![1.0, 0.0, 0.2, 0.9],
+        d: vec![0.0; 2],
+        ..fixtures::plant()
+    };
+    let mut data = recorded(&spring(Vec::new()), &[], 1);
+    data.outputs = 2;
+    data.segments[0].outputs = vec![vec![0.0; SAMPLES]; 2];
+    let mut further = data.segments[0].clone();
+    further.inputs[0].iter_mut().for_each(|u| *u *= 3.0);
+    data.segments.push(further);
+    for (signal, of) in [
+        (Signal::Output(1), [0.0, 1.0]),
+        (Signal::Difference(0, 1), [1.0, -1.0]),
+    ] {
+        let structure = Structure {
+            coordinates: Arc::new(Coordinates::new(&plant)),
+            initial: vec![vec![0.0; 2]; 2],
+            ..spring(vec![Instance {
+                signal,
+                ..effect("cubic_stiffness", "")
+            }])
+        };
+        let problem = Problem::new(&data);
+        let fit = Fit::at(&problem, structure, vec![0.0]).unwrap();
+        let y = &fit.simulated;
+        let position: Vec<f64> = (0..2)
+            .flat_map(|s| (0..SAMPLES).map(move |k| of[0] * y[2 * s][k] + of[1] * y[2 * s + 1][k]))
+            .collect();
+        let found = travel(&problem, &fit, 0);
+        assert_eq!(found, effects::level(&position, 0.95, f64::abs));
+        // What the first alone shows is less.
+        let first = effects::level(&position[..SAMPLES], 0.95, f64::abs);
+        assert!(first < 0.8 * found, "{first} {found}");
+    }
 }

@@ -82,6 +82,12 @@ fn a_long_recording_is_cut_to_where_it_moves_furthest() {
     for (k, (u, y)) in kept.inputs[0].iter().zip(&kept.outputs[0]).enumerate() {
         assert_eq!((*u, *y), (from + k as f64, wave(from as usize + k)));
     }
+    // What happens at the very end counts as what happens elsewhere.
+    let mut late = data(vec![segment(MOST_SAMPLES + MOST_SAMPLES / 4 + 7)]);
+    let end = late.segments[0].samples();
+    late.segments[0].outputs[0][end - 1] += 20.0;
+    trimmed(&mut late);
+    assert_eq!(late.segments[0].inputs[0].last(), Some(&(end as f64 - 1.0)));
     // A quarter more is not worth a cut; and several share what there is.
     let mut short = data(vec![segment(MOST_SAMPLES + MOST_SAMPLES / 4)]);
     trimmed(&mut short);

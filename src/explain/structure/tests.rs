@@ -275,3 +275,47 @@ fn moments_are_what_moves_within_an_interval() {
         assert_abs_diff_eq!(*y, wanted, epsilon = 1e-9);
     }
 }
+
+/// What passes through does so once: the moments add to the state alone.
+#[test]
+fn moments_do_not_pass_through() {
+    let plant = coordinates().given.clone();
+    let wider = with_moments(&plant);
+    assert_eq!((wider.inputs, wider.states), (4, 3));
+    let moment = Derivatives::new(&plant).moment;
+    for (i, row) in wider.b.chunks_exact(4).enumerate() {
+        assert_eq!(row[..2], plant.b[2 * i..2 * i + 2]);
+        assert_eq!(row[2..], [moment[0][i], moment[1][i]]);
+    }
+    assert_eq!(wider.d, [0.01, 0.02, 0.0, 0.0, 0.03, 0.04, 0.0, 0.0]);
+}
+
+/// A drift belongs to the recording it was found in; an offset stays.
+#[test]
+fn what_does_not_persist_is_not_in_a_fresh_recording() {
+    for (id, persists) in [("sensor_drift", false), ("sensor_offset", true)] {
+        let sensor = structure(vec![instance(id, "", 0)]);
+        let mut theta = sensor.given();
+        theta.push(0.3);
+        let prepared = sensor.prepare(&theta);
+        let mut without = theta.clone();
+        *without.last_mut().unwrap() = 0.0;
+        let segment = data().segments.swap_remove(0);
+        for fresh in [false, true] {
+            let clock = Clock {
+                start: 1.0,
+                step: STEP,
+                fresh,
+            };
+            let run = |theta: &[f64]| {
+                sensor
+                    .simulate_segment(theta, &prepared, &segment, &[0.1, 0.2, 0.3], &clock)
+                    .unwrap()
+            };
+            let (with, plain) = (run(&theta), run(&without));
+            let differs = with[0].iter().zip(&plain[0]).any(|(a, b)| a != b);
+            assert_eq!(differs, persists || !fresh, "{id} {fresh}");
+            assert_eq!(with[1], plain[1]);
+        }
+    }
+}

@@ -97,7 +97,7 @@ impl Form {
                     .collect()
             }
             Kind::Load => {
-                let length = windows.position[0].len() as f64 * step;
+                let length = windows.rate[0].len() as f64 * step;
                 (1..LOAD_TIMES)
                     .map(|i| start + length * i as f64 / LOAD_TIMES as f64)
                     .collect()

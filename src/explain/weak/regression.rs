@@ -204,4 +204,22 @@ mod tests {
             );
         }
     }
+
+    #[test]
+    fn what_does_not_determine_its_numbers_is_refused() {
+        let (a, b) = ([1.0, 2.0, -1.0], [0.5, -1.0, 3.0]);
+        let target = [2.0, 1.0, 4.0];
+        let found = Regression::new(&[&a, &b], &target).unwrap();
+        assert_eq!(found.coefficients.len(), 2);
+        // As many numbers as values leave nothing to judge by.
+        assert!(Regression::new(&[&a[..2], &b[..2]], &target[..2]).is_none());
+        for bad in [0.0, f64::NAN, f64::INFINITY] {
+            assert!(
+                Regression::new(&[&a, &[bad; 3]], &target).is_none(),
+                "{bad}"
+            );
+        }
+        let twice = a.map(|v| 2.0 * v);
+        assert!(Regression::new(&[&a, &twice], &target).is_none());
+    }
 }

@@ -211,3 +211,74 @@ fn what_an_equation_leaves_is_told_from_noise() {
         }
     }
 }
+
+/// A law of this name.
+fn form(id: &str) -> Form {
+    Form::all(Reading::Position, &|d| d.id == id)[0]
+}
+
+#[test]
+fn a_pitch_is_found_from_either_side() {
+    let pitch = 0.5;
+    let cogging = |x: f64, _: f64| 1.5 * (std::f64::consts::TAU / pitch * x + 0.4).sin();
+    let data = drive(Reading::Position, SPRING, cogging, 2e-4, 5);
+    let windows = Windows::choose(&data, Reading::Position).unwrap();
+    for share in [0.97, 1.03] {
+        let start = Equation {
+            laws: vec![(form("cogging"), share * pitch)],
+            ..equation(Reading::Position, "")
+        };
+        let found = start.refined(&windows, &data, 1.04).laws[0].1;
+        assert!((found / pitch - 1.0).abs() < 3e-3, "{share}: {found}");
+    }
+    // Pitches are tried in steps of one ratio, up to the range of motion.
+    let shapes = form("cogging").shapes(&windows, 2.0, STEP);
+    let ratio = shapes[1] / shapes[0];
+    assert!(ratio > 1.0);
+    for pair in shapes.windows(2) {
+        assert!((pair[1] / pair[0] / ratio - 1.0).abs() < 1e-9);
+    }
+    let positions = windows.position[0].iter().copied();
+    let (low, high) = positions.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
+        (f64::min(a, x), f64::max(b, x))
+    });
+    let last = shapes[shapes.len() - 1];
+    assert!((last / (high - low) - 1.0).abs() < 1e-9, "{last}");
+}
+
+#[test]
+fn laws_owe_their_shapes() {
+    for (id, owed) in [
+        ("coulomb_friction", 0),
+        ("quadratic_drag", 0),
+        ("cubic_stiffness", 0),
+        ("stribeck_friction", 1),
+        ("input_dead_zone", 1),
+        ("input_saturation", 1),
+        ("cogging", 2),
+        ("load_step", 2),
+    ] {
+        assert_eq!(form(id).owed(), owed, "{id}");
+        assert_eq!(form(id).has_shape(), owed > 0, "{id}");
+    }
+}
+
+#[test]
+fn laws_that_would_push_are_not_physical() {
+    // Whichever way the input is wired, the mass tells the sign.
+    for side in [1.0, -1.0] {
+        for id in ["coulomb_friction", "quadratic_drag"] {
+            assert!(form(id).is_physical(&[0.2 * side], side));
+            assert!(!form(id).is_physical(&[-0.2 * side], side));
+        }
+        assert!(form("stribeck_friction").is_physical(&[0.2 * side, 0.1 * side], side));
+        assert!(!form("stribeck_friction").is_physical(&[0.2 * side, -0.1 * side], side));
+    }
+    // What an actuator takes off the input is about as large as it says.
+    for id in ["input_dead_zone", "input_saturation"] {
+        for (coefficient, physical) in [(1.0, true), (0.8, true), (0.5, false), (-1.0, false)] {
+            assert_eq!(form(id).is_physical(&[coefficient], 1.0), physical, "{id}");
+        }
+    }
+    assert!(form("cubic_stiffness").is_physical(&[-3.0], 1.0));
+}

@@ -45,7 +45,8 @@ pub(crate) struct Windows {
     /// Averaged acceleration and rate.
     pub acceleration: Vec<f64>,
     pub speed: Vec<f64>,
-    /// Position and rate at each sample of each segment (the rate smoothed).
+    /// Position at each sample of each segment, where it is what is read (no law of it is asked about elsewhere), and the
+    /// smoothed rate.
     pub position: Vec<Vec<f64>>,
     pub rate: Vec<Vec<f64>>,
     /// Input that acted about each sample: held from sample to sample, so the mean of the two values next to it.
@@ -123,7 +124,7 @@ pub(crate) fn sensor_noise(data: &Data) -> f64 {
     (sum / 20.0 / n.max(1) as f64).sqrt()
 }
 
-/// Smoothed rate (and, where the rate is what is measured, the position by the trapezoidal rule).
+/// Smoothed rate, and the position where it is measured.
 struct Motion {
     position: Vec<Vec<f64>>,
     rate: Vec<Vec<f64>>,
@@ -185,20 +186,9 @@ impl Motion {
                 v[k] = v[reach.min(n - 1)];
                 v[n - 1 - k] = v[n.saturating_sub(1 + reach)];
             }
-            position.push(match reading {
-                Reading::Position => y.clone(),
-                Reading::Velocity => {
-                    let mut x = 0.0;
-                    (0..n)
-                        .map(|k| {
-                            if k > 0 {
-                                x += 0.5 * step * (y[k] + y[k - 1]);
-                            }
-                            x
-                        })
-                        .collect()
-                }
-            });
+            if reading == Reading::Position {
+                position.push(y.clone());
+            }
             rate.push(v);
         }
         Self {
@@ -387,5 +377,41 @@ mod tests {
         assert!((literal - 7.0).abs() < 10.0 * rounding);
         let kernels = Kernels::new(&weights, step, Reading::Velocity);
         assert!((averaged(&kernels.rate, &vec![2.5; 64], 30) - 2.5).abs() < 1e-12);
+    }
+
+    /// A ramp that the sensor's noise hides, and a recording shorter than the smoothing.
+    #[test]
+    fn smoothing_is_as_long_as_the_noise_asks_for() {
+        let (rate, step) = (0.5, 0.01);
+        for (noise, longest) in [(1e-6, 400), (1e-3, 400), (1.0, 50)] {
+            let ramp = |n: usize| -> Vec<f64> {
+                (0..n)
+                    .map(|k| rate * step * k as f64 + noise * ((k * k % 7) as f64 - 2.0) / 2.0)
+                    .collect()
+            };
+            let data = Data {
+                segments: [2000, 3]
+                    .map(|n| crate::explain::data::Segment {
+                        inputs: vec![vec![0.0; n]],
+                        outputs: vec![ramp(n)],
+                        start_time: 0.0,
+                    })
+                    .to_vec(),
+                sample_time: step,
+                inputs: 1,
+                outputs: 1,
+                constant: false,
+            };
+            let motion = Motion::new(&data, Reading::Position, noise, longest);
+            let quiet = motion.noise <= RATE_NOISE * rate * 1.2;
+            assert_eq!(quiet, noise < 1.0, "{noise}: {}", motion.noise);
+            assert!(quiet || motion.reach == longest);
+            assert_eq!(motion.reach == 2, noise == 1e-6, "{}", motion.reach);
+            if quiet {
+                let middle = motion.rate[0][1000];
+                assert!((middle / rate - 1.0).abs() < 0.1, "{middle}");
+                assert_eq!(motion.rate[0][0], motion.rate[0][motion.reach]);
+            }
+        }
     }
 }

@@ -180,3 +180,42 @@ fn residual_covariance(
         .copy_from(&(y - &now * c.transpose() - &u * d.transpose()));
     Ok(residual.transpose() * &residual / regression.columns as f64)
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+
+    use super::*;
+    use crate::systems;
+
+    /// Two inputs, two outputs, two experiments with initial states of their own, longer than a block.
+    #[test]
+    fn responses_are_found_without_noise() {
+        let mut truth = systems::two_by_two().system;
+        for feedthrough in [false, true] {
+            if feedthrough {
+                truth.d = DMatrix::from_row_slice(2, 2, &[0.4, -0.2, 0.1, 0.9]);
+            }
+            let n = truth.states();
+            let signals: Vec<Vec<Vec<f64>>> = [BLOCK + 37, 200]
+                .into_iter()
+                .enumerate()
+                .map(|(e, samples)| {
+                    let input = |j: usize| -> Vec<f64> {
+                        (0..samples)
+                            .map(|k| (0.1 * ((k * k + 7 * e + 1) * (j + 2)) as f64).sin())
+                            .collect()
+                    };
+                    let u = [input(0), input(1)];
+                    let x0 = DVector::from_fn(n, |i, _| 1.0 + i as f64 - 2.0 * e as f64);
+                    let y = truth.simulate(&[&u[0], &u[1]], Some(&x0)).unwrap();
+                    u.into_iter().chain(y).collect()
+                })
+                .collect();
+            let experiments: Vec<&Signals> = signals.iter().map(Vec::as_slice).collect();
+            let (b, d) = by_simulation(&truth.a, &truth.c, &experiments, 2, feedthrough).unwrap();
+            assert!((b - &truth.b).amax() < 1e-8, "{feedthrough}");
+            assert!((d - &truth.d).amax() < 1e-8, "{feedthrough}");
+        }
+    }
+}

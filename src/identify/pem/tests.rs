@@ -197,3 +197,39 @@ fn what_has_no_likelihood_or_no_form_is_an_error() {
         prediction_error_method(&two.system, &[&signals], false, Form::Armax, 3).unwrap_err();
     assert!(error.to_string().contains("one input and one output"));
 }
+
+/// The minimum of `|J d + r|^2 + (damping s_1)^2 |d|^2` over columns of unit size, by its normal equations.
+#[test]
+fn steps_are_damped_least_squares() {
+    let unit = [1e-6, 1.0, 1e4];
+    let jacobian = DMatrix::from_fn(9, 3, |i, j| {
+        unit[j] * ((i * 3 + j * j + i * j) as f64).sin()
+    });
+    let residual = DVector::from_fn(9, |i, _| (i as f64).cos());
+    let mut factor = jacobian.clone().insert_column(3, 0.0);
+    factor.set_column(3, &residual);
+    let found = Linearised::new(&qr_r(&factor), 3).unwrap();
+    let scale: Vec<f64> = jacobian.column_iter().map(|c| c.norm()).collect();
+    let even = DMatrix::from_fn(9, 3, |i, j| jacobian[(i, j)] / scale[j]);
+    let gram = even.tr_mul(&even);
+    let right = -even.tr_mul(&residual);
+    let largest = gram.symmetric_eigenvalues().max();
+    for damping in [0.0, 0.1, 3.0] {
+        let damped = &gram + DMatrix::identity(3, 3) * (damping * damping * largest);
+        let wanted = damped.cholesky().unwrap().solve(&right);
+        for (i, step) in found.step(damping).into_iter().enumerate() {
+            let wanted = wanted[i] / scale[i];
+            assert!((step / wanted - 1.0).abs() < 1e-9, "{damping} {i}");
+        }
+    }
+    let full = gram.cholesky().unwrap();
+    assert!((found.decrease() - right.dot(&full.solve(&right))).abs() < 1e-10);
+    let inverse = full.inverse();
+    let covariance = found.covariance();
+    for i in 0..3 {
+        for j in 0..3 {
+            let wanted = inverse[(i, j)] / (scale[i] * scale[j]);
+            assert!((covariance[(i, j)] / wanted - 1.0).abs() < 1e-9);
+        }
+    }
+}

@@ -159,6 +159,29 @@ mod tests {
         }
     }
 
+    /// The minimum of `|J d - r|^2 + (damping s_1)^2 |d|^2`, by its normal equations.
+    #[test]
+    fn steps_are_damped_least_squares() {
+        let jacobian = DMatrix::from_fn(9, 3, |i, j| ((i * 3 + j * j + i * j) as f64).sin());
+        let residual: Vec<f64> = (0..9).map(|i| f64::from(i).cos()).collect();
+        let found = linearise(jacobian.clone(), &residual, 3, &DMatrix::zeros(0, 3)).unwrap();
+        let gram = jacobian.tr_mul(&jacobian);
+        let right = jacobian.tr_mul(&DVector::from_column_slice(&residual));
+        let largest = gram.symmetric_eigenvalues().max();
+        for damping in [0.0, 0.1, 3.0] {
+            let damped = &gram + DMatrix::identity(3, 3) * (damping * damping * largest);
+            let wanted = damped.cholesky().unwrap().solve(&right);
+            let step = found.step(damping);
+            assert!(
+                (&step - &wanted).norm() < 1e-10 * wanted.norm(),
+                "{damping}"
+            );
+        }
+        let full = gram.clone().cholesky().unwrap();
+        assert!((found.decrease() - right.dot(&full.solve(&right))).abs() < 1e-10);
+        assert!((found.covariance() - full.inverse()).norm() < 1e-10);
+    }
+
     #[test]
     fn moduli_on_the_boundary_change_as_by_differences() {
         // A pair at a modulus of 0.9, and a real eigenvalue further inside; in no special basis.

@@ -276,4 +276,17 @@ mod tests {
             assert!(result.iterations <= 12, "{}", result.iterations);
         }
     }
+
+    #[test]
+    fn dampings_span_all_decades() {
+        let dampings: Vec<f64> = tries().map(|t| t.1).filter(|d| *d > 0.0).collect();
+        let (low, high) = (dampings[0], dampings[dampings.len() - 1]);
+        assert!((low / 1e-10 - 1.0).abs() < 1e-9 && (high - 1.0).abs() < 1e-9);
+        // Never more than a decade apart, and less where they are a large share.
+        for pair in dampings.windows(2) {
+            let most = if pair[0] > 0.9e-5 { 1.8 } else { 10.1 };
+            assert!(pair[0] < pair[1] && pair[1] < most * pair[0], "{pair:?}");
+        }
+        assert_eq!(tries().filter(|t| t.1 == 0.0).count(), LENGTHS.len());
+    }
 }

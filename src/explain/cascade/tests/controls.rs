@@ -52,6 +52,12 @@ fn what_is_no_tank_is_left_alone() {
         &ringing.iter().map(|y| y + 5.0).collect::<Vec<_>>()
     ));
     assert!(none(&normals(500, 5), &y));
+    // A level that wanders by itself.
+    let wander = normals(500, 6).into_iter().scan(0.0, |level, e| {
+        *level = 0.97 * *level + 0.2 * e;
+        Some(5.0 + *level)
+    });
+    assert!(none(&u, &wander.collect::<Vec<_>>()));
     assert!(
         none(&u, &vec![1.0; 500]) && none(&vec![0.0; 500], &y) && none(&u, &vec![f64::NAN; 500])
     );
@@ -115,6 +121,51 @@ fn derivatives_match_differences() {
                 (slope - carried).abs() < 1e-4 * (1.0 + slope.abs()),
                 "{law:?} {i}: {slope} {carried}"
             );
+        }
+    }
+}
+
+/// Exchanged tanks are as slow as each other's place was, and the upper level keeps its distance from the rim in its
+/// own measure; exchanged again they are what they were.
+#[test]
+fn tanks_are_exchanged_and_back() {
+    for law in [Law::Root, Law::Linear] {
+        let cascade = Cascade {
+            parts: Parts {
+                law,
+                upper_overflow: true,
+                lower_overflow: false,
+                constant_inflow: false,
+                pump_bias: false,
+            },
+            numbers: [0.05, 0.04, 0.08, 9.0, 0.4, 0.0, 0.0, 0.0],
+        };
+        let u: Vec<f64> = (0..400)
+            .map(|k| 2.0 + 0.1 * (0.01 * f64::from(k)).sin())
+            .collect();
+        let y = cascade.simulate(&u, [6.0, 1.5]);
+        let problem = Problem {
+            records: vec![(u, y)],
+            mask: vec![vec![true; 400]],
+            count: 400,
+        };
+        let trial = problem.priced(Trial {
+            cascade,
+            initial: vec![[6.0, 1.5]],
+            cost: 0.0,
+        });
+        let there = problem.exchanged(&trial);
+        let [upper, lower] = problem.times(&trial);
+        let [upper_there, lower_there] = problem.times(&there);
+        assert!(upper / lower > 1.5 || lower / upper > 1.5);
+        assert!((upper_there / lower - 1.0).abs() < 0.2, "{law:?}");
+        assert!((lower_there / upper - 1.0).abs() < 0.2, "{law:?}");
+        let share = |t: &Trial| t.initial[0][0] / t.cascade.number(Number::UpperRim);
+        assert!((share(&there) / share(&trial) - 1.0).abs() < 1e-9);
+        let back = problem.exchanged(&there);
+        for number in Number::ALL {
+            let (was, is) = (trial.cascade.number(number), back.cascade.number(number));
+            assert!((is - was).abs() <= 0.2 * was.abs(), "{law:?} {number:?}");
         }
     }
 }
