@@ -36,6 +36,11 @@ impl Answer<'_> {
             let structure = &model.structure;
             let from = structure.effect_offset(structure.first_new());
             fit.narrow(problem, &mut certainty.covariance, from..structure.len());
+            for at in (structure.first_new()..structure.effects.len())
+                .filter_map(|index| structure.change_time(index))
+            {
+                fit.ask_all_times(problem, &mut certainty.covariance, at);
+            }
         }
         let covariance = certainty.as_ref().map(|c| &c.covariance);
         let disagreement = certainty.as_ref().and_then(|c| c.halves_disagree.as_ref());

@@ -3,6 +3,7 @@
 //! Tails are met by iterated weights (Student's t), the noise model is estimated anew between rounds.
 
 mod certainty;
+mod change;
 mod gauss_newton;
 mod profile;
 mod slopes;

@@ -283,7 +283,8 @@ pub(crate) fn fit_lead(
 ) -> Option<Fit> {
     let start = best_size(problem, &structure, start);
     let fit = Fit::run(problem, structure, start, None, effort)?;
-    let Some(at) = change_time(&fit.structure) else {
+    let last = fit.structure.effects.len().checked_sub(1);
+    let Some(at) = last.and_then(|index| fit.structure.change_time(index)) else {
         return Some(fit);
     };
     let scanned = scan(problem, &fit, at)?;
@@ -345,18 +346,6 @@ fn best_size(problem: &Problem, structure: &Structure, start: Vec<f64>) -> Vec<f
         }
     }
     best.1
-}
-
-/// Index of the time of change of the last effect, if it has one.
-fn change_time(structure: &Structure) -> Option<usize> {
-    let index = structure.effects.len().checked_sub(1)?;
-    let effect = &structure.effects[index];
-    let at = effect
-        .definition
-        .parameters
-        .iter()
-        .position(|p| p.unit == Unit::Second && p.name == "from")?;
-    Some(structure.effect_offset(index) + effect.amplitudes(structure.states()) + at)
 }
 
 /// Coarse-to-fine scan of number `at`, the others held.
@@ -432,8 +421,7 @@ mod tests {
     #[test]
     fn the_time_of_a_change_is_found_from_afar() {
         let changed = spring(vec![effect("gain_change", "")]);
-        assert_eq!(change_time(&changed), Some(1));
-        assert_eq!(change_time(&spring(Vec::new())), None);
+        assert_eq!(changed.change_time(0), Some(1));
         let truth = [2.0, 40.03];
         for (seed, start) in [44.0, 38.0, 36.5].into_iter().enumerate() {
             let data = recorded(&changed, &truth, seed as u64);
@@ -454,6 +442,40 @@ mod tests {
             // No scan makes it worse than it was.
             let unscanned = run(begin).unwrap();
             assert!(fit.deviance <= unscanned.deviance + 1e-9);
+        }
+    }
+
+    /// Times scatter about the truth as is stated; what the slope says does not.
+    #[test]
+    fn the_time_of_a_change_is_as_certain_as_is_said() {
+        let changed = spring(vec![effect("gain_change", "")]);
+        for (size, runs) in [(0.6, 60), (2.0, 60)] {
+            let truth = [size, 40.0];
+            let found: Vec<[f64; 2]> = (0..runs)
+                .into_par_iter()
+                .map(|seed| {
+                    let data = recorded(&changed, &truth, 300 + seed);
+                    let problem = Problem::new(&data);
+                    let begin = vec![0.5 * size, 40.5];
+                    let mut fit =
+                        fit_lead(&problem, changed.clone(), begin, Effort::FINAL).unwrap();
+                    let mut covariance = fit.certainty(&problem).unwrap().covariance;
+                    let off = fit.theta[1] - truth[1];
+                    let slope = off / covariance[(1, 1)].sqrt();
+                    fit.ask_all_times(&problem, &mut covariance, 1);
+                    [off / covariance[(1, 1)].sqrt(), slope]
+                })
+                .collect();
+            let [said, slope] = [0, 1].map(|which| {
+                let squares: f64 = found.iter().map(|z| z[which].powi(2)).sum();
+                (squares / runs as f64).sqrt()
+            });
+            println!("size {size}: {said:.2} stated, {slope:.1} linearised deviations");
+            let far = found.iter().filter(|z| z[0].abs() > 3.0).count();
+            assert!(
+                (0.6..1.4).contains(&said) && far <= 2,
+                "{size}: {said} {far}"
+            );
         }
     }
 }

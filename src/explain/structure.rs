@@ -174,6 +174,13 @@ impl Structure {
                 .sum::<usize>()
     }
 
+    /// Place of the time at which effect `index` begins, if it has one.
+    pub fn change_time(&self, index: usize) -> Option<usize> {
+        let effect = &self.effects[index];
+        let at = effect.definition.change_time()?;
+        Some(self.effect_offset(index) + effect.amplitudes(self.states()) + at)
+    }
+
     /// The numbers of effect `index`.
     pub fn effect_numbers<'a>(&'a self, theta: &'a [f64], index: usize) -> &'a [f64] {
         if !self.plant_free && index < self.known.len() {

@@ -228,11 +228,16 @@ impl Definition {
             .is_some_and(|p| matches!(p.name, "delay" | "time_constant" | "width" | "half_gap"))
     }
 
-    /// Whether it begins at some time in the recording.
-    pub(crate) fn changes(&self) -> bool {
+    /// Which of its parameters is the time in the recording at which it begins.
+    pub(crate) fn change_time(&self) -> Option<usize> {
         self.parameters
             .iter()
-            .any(|p| p.name == "from" && p.unit == Unit::Second)
+            .position(|p| p.name == "from" && p.unit == Unit::Second)
+    }
+
+    /// Whether it begins at some time in the recording.
+    pub(crate) fn changes(&self) -> bool {
+        self.change_time().is_some()
     }
 
     /// Where the effect acts.
