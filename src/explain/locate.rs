@@ -492,6 +492,28 @@ mod tests {
                 assert!(region.to > HIGH && region.p_value < 1e-6, "{region:?}");
             }
             let strongest = &found[0];
+            // The test of means, for as many regions as were asked about: eighths of six variables.
+            let (mut inside, mut outside) = (Moments::default(), Moments::default());
+            for s in 0..2 {
+                for (u, e) in data.segments[s].inputs[0].iter().zip(&squares[2 * s + 1]) {
+                    let v = if strongest.variable == "u" {
+                        *u
+                    } else {
+                        u.abs()
+                    };
+                    let side = if v >= strongest.from {
+                        &mut inside
+                    } else {
+                        &mut outside
+                    };
+                    side.add(*e);
+                }
+            }
+            let expected = 48.0 * inside.exceeds(&outside);
+            assert!(
+                (strongest.p_value - expected).abs() <= 1e-6 * expected,
+                "{strongest:?} {expected}"
+            );
             assert!((strongest.excess / 9.0 - 1.0).abs() < 0.35, "{strongest:?}");
             if which == 0 {
                 assert!(

@@ -437,3 +437,56 @@ fn clock(data: &Data, segment: usize) -> Clock {
         fresh: false,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::fixtures::{effect, recorded, spring};
+    use crate::explain::noise::MOST_ORDER;
+    use crate::explain::structure::Structure;
+
+    /// The lead of an effect at the place where it acts, beside the plant as it is.
+    fn lead(truth: &Structure, theta: &[f64], direction: Direction) -> (Lead, f64) {
+        let data = recorded(truth, theta, 6);
+        let problem = Problem::new(&data);
+        let plain = spring(Vec::new());
+        let mut basis = Fit::at(&problem, plain, Vec::new()).unwrap();
+        let id = truth.effects[0].definition.id;
+        let noise = Noise::estimate(&basis.residual, 1, &problem.mask, MOST_ORDER);
+        let leads = screen(&problem, &mut basis, &[noise], &|d| d.id == id)
+            .swap_remove(0)
+            .into_iter();
+        let here = leads.filter(|l| l.instance.direction == direction);
+        let best = here
+            .max_by(|a, b| a.gain.total_cmp(&b.gain))
+            .expect("a lead");
+        let fit = Fit::at(&problem, truth.clone(), theta.to_vec()).unwrap();
+        let brought = basis.noise.deviance(&basis.residual, &problem.mask)
+            - basis.noise.deviance(&fit.residual, &problem.mask);
+        (best, brought)
+    }
+
+    #[test]
+    fn a_force_is_tried_with_each_input_at_its_size() {
+        let truth = spring(vec![effect("cubic_stiffness", "")]);
+        let (lead, _) = lead(&truth, &[30.0], Direction::Matched(0));
+        let size = lead.start[0] / 30.0;
+        assert!((0.5..1.5).contains(&size), "{:?}", lead.start);
+        assert!(lead.gain > 20.0, "{}", lead.gain);
+    }
+
+    /// In phase and out of phase with its input.
+    #[test]
+    fn a_mode_is_seen_in_either_phase() {
+        for residues in [[0.3, 0.0], [0.0, 0.3]] {
+            let truth = spring(vec![Instance {
+                direction: Direction::Free,
+                ..effect("extra_mode", "")
+            }]);
+            let theta = [1.0_f64.ln(), 0.05_f64.ln(), residues[0], residues[1]];
+            let (lead, brought) = lead(&truth, &theta, Direction::Free);
+            println!("{residues:?}: {} of {brought}", lead.gain);
+            assert!(lead.gain > 0.3 * brought, "{} of {brought}", lead.gain);
+        }
+    }
+}

@@ -271,7 +271,7 @@ mod tests {
                     data.segments[0].inputs.push(vec![1.0; SAMPLES]);
                     structure.coordinates = Arc::new(Coordinates::new(&Plant {
                         inputs: 2,
-                        b: vec![0.005, 0.001, 0.09, 0.002],
+                        b: vec![0.005, 0.0, 0.09, 0.0],
                         d: vec![0.0; 2],
                         ..fixtures::plant()
                     }));

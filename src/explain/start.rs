@@ -205,6 +205,8 @@ fn climb(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::explain::fixtures::{effect, spring};
+    use crate::log::Channel;
 
     fn prior(mean: [f64; 2], weight: [f64; 4]) -> Prior {
         Prior {
@@ -251,5 +253,22 @@ mod tests {
             "{found}"
         );
         assert!(cost < 1e-8);
+    }
+
+    #[test]
+    fn rims_and_lost_signs_have_kinks() {
+        let structure = spring(vec![effect("cubic_stiffness", "")]);
+        let channels = [Channel::new("c")];
+        let mut model =
+            AugmentedModel::describe(&structure, &[0.1], &channels, &channels, &[0], false);
+        for (id, kinks) in [
+            ("overflow", true),
+            ("sensor_rectification", true),
+            ("sensor_saturation", false),
+            ("cubic_stiffness", false),
+        ] {
+            model.effects[0].effect = id.to_owned();
+            assert_eq!(model.has_kinks(), kinks, "{id}");
+        }
     }
 }

@@ -166,6 +166,12 @@ fn figures_agree(case: &str, said: &Explanation) {
             "{case}: {evidence:?}"
         );
         assert!(size.heldout_gain > 0.0, "{case}: {size:?}");
+        for (name, quantity) in &first.parameters {
+            assert!(
+                quantity.std.is_some_and(|std| std > 0.0 && std.is_finite()),
+                "{case}: {name} {quantity:?}"
+            );
+        }
         assert!(
             said.fit.train.noise_floor.rmse < 1.05 * train.augmented.rmse,
             "{case}"

@@ -88,6 +88,14 @@ fn a_long_recording_is_cut_to_where_it_moves_furthest() {
     late.segments[0].outputs[0][end - 1] += 20.0;
     trimmed(&mut late);
     assert_eq!(late.segments[0].inputs[0].last(), Some(&(end as f64 - 1.0)));
+    // A tenth further is further.
+    let mut slightly = data(vec![segment(n)]);
+    for (k, y) in slightly.segments[0].outputs[0].iter_mut().enumerate() {
+        let size = if k < 13_000 { 1.0 } else { 1.1 };
+        *y = size * (0.01 * k as f64).sin();
+    }
+    trimmed(&mut slightly);
+    assert!(slightly.segments[0].inputs[0].last().copied() > Some(13_000.0));
     // A quarter more is not worth a cut; and several share what there is.
     let mut short = data(vec![segment(MOST_SAMPLES + MOST_SAMPLES / 4)]);
     trimmed(&mut short);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::super::account::{amplitude_name, amplitude_unit, port_name};
 use super::super::answer::Answer;
@@ -131,19 +131,8 @@ impl Answer<'_> {
             let own = &c[at..at + count];
             let (amplitude, numbers) = form.numbers(own, *shape);
             let mut parameters = BTreeMap::new();
-            // Standard deviation of a function of the coefficients, by its gradient.
-            let std = |of: &dyn Fn(&[f64]) -> f64| -> Option<f64> {
-                let here = of(own);
-                let gradient = DVector::from_fn(count, |i, _| {
-                    let step = 1e-4 * proof.std(at + i).unwrap_or(0.0).max(1e-300);
-                    let mut moved = own.to_vec();
-                    moved[i] += step;
-                    (of(&moved) - here) / step
-                });
-                let block = proof.tethered.covariance.view((at, at), (count, count));
-                let variance = (gradient.transpose() * block * &gradient)[(0, 0)];
-                (variance > 0.0).then(|| variance.sqrt())
-            };
+            let block = proof.tethered.covariance.view((at, at), (count, count));
+            let std = |of: &dyn Fn(&[f64]) -> f64| deviation(of, own, &block.into_owned());
             if !form.on_input() {
                 parameters.insert(
                     amplitude_name(definition.id).to_owned(),
@@ -237,6 +226,43 @@ impl Units {
             stiffness: per(""),
             rotates,
             force,
+        }
+    }
+}
+
+/// Standard deviation of a function of numbers with this covariance, by its gradient; `None` where it does not depend on
+/// them.
+fn deviation(
+    of: &dyn Fn(&[f64]) -> f64,
+    numbers: &[f64],
+    covariance: &DMatrix<f64>,
+) -> Option<f64> {
+    let here = of(numbers);
+    let gradient = DVector::from_fn(numbers.len(), |i, _| {
+        let step = 1e-4 * covariance[(i, i)].max(0.0).sqrt().max(1e-300);
+        let mut moved = numbers.to_vec();
+        moved[i] += step;
+        (of(&moved) - here) / step
+    });
+    let variance = (gradient.transpose() * covariance * &gradient)[(0, 0)];
+    (variance > 0.0).then(|| variance.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn uncertainty_goes_through_functions_in_any_unit() {
+        for unit in [1e-9, 1.0, 1e9] {
+            let numbers = [0.3 * unit, 0.4 * unit];
+            let covariance = DMatrix::from_row_slice(2, 2, &[4e-4, 1e-4, 1e-4, 9e-4]) * unit * unit;
+            let length = |c: &[f64]| c[0].hypot(c[1]);
+            // Along (0.6, 0.8).
+            let expected = (0.36 * 4e-4 + 2.0 * 0.48 * 1e-4 + 0.64 * 9e-4_f64).sqrt() * unit;
+            let found = deviation(&length, &numbers, &covariance).unwrap();
+            assert!((found / expected - 1.0).abs() < 1e-4, "{unit}: {found}");
+            assert_eq!(deviation(&|_| 2.0, &numbers, &covariance), None);
         }
     }
 }
