@@ -30,7 +30,8 @@ use crate::linalg::{LinalgError, all_finite, cholesky_upper, multiply_nt, solve_
 use crate::model::StateSpace;
 
 /// The iteration ends when a step promises less than this in the cost, which is in units of chi-square: the
-/// parameters are then within 1e-10 standard deviations of the minimum, whatever start they came from.
+/// parameters are then within 1e-10 standard deviations of the minimum, whatever start they came from. In a flat valley it ends
+/// before ([`FLAT_STEPS`]), and rounding of the start is seen along it.
 const DECREASE: f64 = 1e-20;
 /// Of steps that promise less than this, the costs differ by little more than their rounding (1e-16 of a cost of 100 is
 /// 1e-14): choosing among them would be chance, and two starts that differ by rounding would end 1e-6 standard deviations
