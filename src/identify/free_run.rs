@@ -215,6 +215,10 @@ fn effective(series: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::records::MemoryRecords;
+    use crate::log::{Channel, Log};
+    use crate::moments::Detrend;
+    use crate::systems::two_by_two;
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
 
@@ -238,5 +242,60 @@ mod tests {
                 "{a}: {found} {expected}"
             );
         }
+    }
+
+    /// In whatever units it was recorded: the plant itself leaves nothing, another one does.
+    #[test]
+    fn free_runs_are_in_the_units_of_the_factors() {
+        let truth = two_by_two().system;
+        let units = [1e3, 0.02, 5.0, 1e-4];
+        let wave = |rate: f64| -> Vec<f64> {
+            (0..600)
+                .map(|k| (rate * f64::from(k * k % 997)).sin())
+                .collect()
+        };
+        let inputs = [wave(0.7), wave(1.3)];
+        let outputs = truth.simulate(&[&inputs[0], &inputs[1]], None).unwrap();
+        let in_units = |columns: &[Vec<f64>], units: &[f64]| -> Vec<Vec<f64>> {
+            let of = columns.iter().zip(units);
+            of.map(|(c, unit)| c.iter().map(|v| v * unit).collect())
+                .collect()
+        };
+        let log = Log {
+            name: "two by two".to_owned(),
+            sample_time: 1.0,
+            start_time: 0.0,
+            inputs: vec![Channel::new("u1"), Channel::new("u2")],
+            outputs: vec![Channel::new("y1"), Channel::new("y2")],
+            input_data: in_units(&inputs, &units[..2]),
+            output_data: in_units(&outputs, &units[2..]),
+            sha256: None,
+        };
+        let logs = [log];
+        let mut records = MemoryRecords::new(&logs).unwrap();
+        let options = Options {
+            detrend: Detrend::None,
+            ..Options::default()
+        };
+        let data = Data::read(&mut records, &options, 20).unwrap();
+        let mut scaled = truth.clone();
+        let sizes: Vec<f64> = data.scale.iter().zip(units).map(|(s, u)| s / u).collect();
+        for (mut column, size) in scaled.b.column_iter_mut().zip(&sizes[..2]) {
+            column.scale_mut(*size);
+        }
+        for (mut row, size) in scaled.c.row_iter_mut().zip(&sizes[2..]) {
+            row.scale_mut(1.0 / size);
+        }
+        let mut other = scaled.clone();
+        other.b *= 1.1;
+        let n = truth.states();
+        let systems = [(n, scaled, false), (n, other, false)];
+        let errors = free_runs(&systems, &data, &mut records).unwrap();
+        let largest = |which: usize| {
+            let all = errors[which].iter().flatten();
+            all.fold(0.0_f64, |most, e| most.max(e.abs()))
+        };
+        assert!(largest(0) < 1e-9, "{}", largest(0));
+        assert!(largest(1) > 1e-2, "{}", largest(1));
     }
 }
