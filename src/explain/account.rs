@@ -5,15 +5,14 @@ use std::collections::BTreeMap;
 use super::answer::Answer;
 use super::effects::{self, Action, Port};
 use super::explanation::{
-    Alternative, Detectable, EFFECTS_TIE, EffectFound, Evidence, ParameterChange, Quantity, Verdict,
+    Alternative, Detectable, EFFECTS_TIE, EffectFound, Evidence, Quantity, Verdict,
 };
 use super::fit::{Fit, Problem};
-use super::functionals::{Functionals, dot};
+use super::functionals::{Functionals, dot, matched_sign, static_equivalent};
 use super::inquiry::NEEDED;
 use super::structure::{Direction, Signal};
 use super::words;
 use crate::log::Channel;
-use crate::model::StateSpace;
 
 impl Answer<'_> {
     fn signal_name(&self, effect: &super::structure::Instance) -> String {
@@ -56,7 +55,7 @@ impl Answer<'_> {
             let std = |at: usize| covariance.map(|c| c[(at, at)].max(0.0).sqrt());
             let mut parameters = BTreeMap::new();
             let amplitudes = effect.amplitudes(model.structure.states());
-            if let Action::Force(..) = definition.action {
+            if let (Action::Force(..), false) = (definition.action, definition.is_curve()) {
                 self.amplitude(model, index, covariance, &mut parameters);
             }
             for (i, p) in definition.parameters.iter().enumerate() {
@@ -223,11 +222,15 @@ impl Answer<'_> {
         let effect = &structure.effects[index];
         let plant = structure.plant(&model.theta);
         let rows = Functionals::new(&plant);
-        let rate = if effect.definition.variant == "smooth" {
-            // A speed that inputs hold: what holds it against the friction.
-            held(&plant, rows.of(&plant, effect.signal).rate)
-        } else {
-            rows.of(&plant, effect.signal).rate
+        let rate = rows.of(&plant, effect.signal).rate;
+        let position = match effect.signal {
+            Signal::Output(o) | Signal::Integral(o) => plant.c_row(o).to_vec(),
+            Signal::Difference(i, j) => plant
+                .c_row(i)
+                .iter()
+                .zip(plant.c_row(j))
+                .map(|(a, b)| a - b)
+                .collect(),
         };
         let numbers = structure.effect_numbers(&model.theta, index);
         let offset = structure.effect_offset(index);
@@ -241,24 +244,24 @@ impl Answer<'_> {
                 self.inputs()[input].unit.clone().unwrap_or_default(),
             ),
             Direction::Free => {
-                // Along the strongest input's effect on the rate.
+                // The input with the strongest effect on the rate.
                 let gain = |input: usize| dot(&rate, &plant.b_column(input));
                 let input = (0..self.data().signals())
                     .max_by(|a, b| gain(*a).abs().total_cmp(&gain(*b).abs()))
                     .unwrap_or(0);
-                let scale = gain(input);
-                if scale.abs() < 1e-300 {
+                let Some(balance) = static_equivalent(&plant, &position, input) else {
                     return;
-                }
+                };
                 let n = structure.states();
-                let value = dot(&rate, &numbers[..n]) / scale;
+                let sign = matched_sign(&plant, &rate, input);
+                let value = sign * dot(&balance.row, &numbers[..n]);
                 let std = covariance.filter(|_| !fixed).map(|c| {
                     let block = c.view((offset, offset), (n, n));
-                    let r = nalgebra::DVector::from_column_slice(&rate);
-                    ((r.transpose() * block * &r)[(0, 0)].max(0.0)).sqrt() / scale.abs()
+                    let r = nalgebra::DVector::from_column_slice(&balance.row);
+                    ((r.transpose() * block * &r)[(0, 0)].max(0.0)).sqrt()
                 });
                 (
-                    value * scale.signum(),
+                    value,
                     std,
                     self.inputs()[input].unit.clone().unwrap_or_default(),
                 )
@@ -372,131 +375,6 @@ impl Answer<'_> {
         list.sort_by(|a, b| a.share_of_output.total_cmp(&b.share_of_output));
         list
     }
-
-    pub(crate) fn parameter_changes(&self, boring: &Fit) -> Vec<ParameterChange> {
-        let fit = if self.finding.model.structure.plant_free {
-            &self.finding.model
-        } else {
-            boring
-        };
-        // What is no adjustment of the simulation's plant, but another one, has nothing to compare with.
-        let simulated = &self.known.structure.coordinates;
-        let model = &self.finding.model.structure.coordinates;
-        if !std::sync::Arc::ptr_eq(model, simulated) {
-            return Vec::new();
-        }
-        if !fit.structure.plant_free {
-            return self.adjustments(fit);
-        }
-        let system = |plant: &super::plant::Plant| {
-            StateSpace::deterministic(
-                plant.a_matrix(),
-                plant.b_matrix(),
-                plant.c_matrix(),
-                plant.d_matrix(),
-                plant.sample_time,
-            )
-            .ok()
-        };
-        let (Some(before), Some(after)) = (
-            system(&fit.structure.coordinates.given),
-            system(&fit.structure.plant(&fit.theta)),
-        ) else {
-            return Vec::new();
-        };
-        let mut changes = Vec::new();
-        if let (Ok(mut a), Ok(mut b)) = (before.poles(), after.poles()) {
-            let key = |p: &crate::model::Pole| (p.natural_frequency, p.value.im);
-            a.retain(|p| p.value.im >= 0.0);
-            b.retain(|p| p.value.im >= 0.0);
-            a.sort_by(|x, y| key(x).0.total_cmp(&key(y).0));
-            b.sort_by(|x, y| key(x).0.total_cmp(&key(y).0));
-            if a.len() == b.len() {
-                for (i, (x, y)) in a.iter().zip(&b).enumerate() {
-                    changes.push(ParameterChange {
-                        name: format!("natural frequency {}", i + 1),
-                        simulation: x.natural_frequency / std::f64::consts::TAU,
-                        recording: y.natural_frequency / std::f64::consts::TAU,
-                        unit: "Hz".to_owned(),
-                    });
-                    if let (Some(simulation), Some(recording), true) =
-                        (x.damping, y.damping, x.value.im > 0.0 && y.value.im > 0.0)
-                    {
-                        changes.push(ParameterChange {
-                            name: format!("damping ratio {}", i + 1),
-                            simulation,
-                            recording,
-                            unit: String::new(),
-                        });
-                    }
-                }
-            }
-        }
-        if let (Some(a), Some(b)) = (before.static_gain(), after.static_gain()) {
-            for o in 0..self.outputs().len() {
-                for j in 0..self.data().signals() {
-                    if a[(o, j)].abs() > 1e-9 {
-                        changes.push(ParameterChange {
-                            name: format!(
-                                "static gain {}/{}",
-                                self.outputs()[o].name,
-                                self.inputs()[j].name
-                            ),
-                            simulation: a[(o, j)],
-                            recording: b[(o, j)],
-                            unit: String::new(),
-                        });
-                    }
-                }
-            }
-        }
-        changes.retain(|c| c.simulation.is_finite() && c.recording.is_finite());
-        changes
-    }
-
-    /// Single numbers that were adjusted beside the plant as given.
-    fn adjustments(&self, fit: &Fit) -> Vec<ParameterChange> {
-        let structure = &fit.structure;
-        (structure.known.len()..structure.first_new())
-            .map(|index| {
-                let effect = &structure.effects[index];
-                let number = structure.effect_numbers(&fit.theta, index)[0];
-                let (input, output) = self.channels_of(effect);
-                let unit = |of: &str| match (&input.unit, &output.unit) {
-                    (Some(i), Some(o)) => format!("{i}/({o}{of})"),
-                    _ => String::new(),
-                };
-                match effect.definition.id {
-                    "input_gain" => ParameterChange {
-                        name: format!("gain of {}, relative", input.name),
-                        simulation: 1.0,
-                        recording: 1.0 + number,
-                        unit: String::new(),
-                    },
-                    id => ParameterChange {
-                        name: format!(
-                            "additional {} at {}",
-                            id.trim_start_matches("linear_"),
-                            output.name
-                        ),
-                        simulation: 0.0,
-                        recording: number,
-                        unit: unit(if id == "linear_damping" { "/s" } else { "" }),
-                    },
-                }
-            })
-            .collect()
-    }
-}
-
-/// `row (I - A)^-1`: a row of the state under a constant push.
-fn held(plant: &super::plant::Plant, row: Vec<f64>) -> Vec<f64> {
-    let n = plant.states;
-    let Some(inverse) = (nalgebra::DMatrix::identity(n, n) - plant.a_matrix()).try_inverse() else {
-        return row;
-    };
-    let held = nalgebra::RowDVector::from_row_slice(&row) * inverse;
-    held.iter().copied().collect()
 }
 
 /// What the amplitude of a force is called.
@@ -510,6 +388,7 @@ pub(crate) fn amplitude_name(id: &str) -> &'static str {
         "direction_dependent_friction" => "friction_difference",
         "end_stop" => "stop_stiffness",
         "stiffness_change" => "stiffness_change",
+        "mass_change" => "mass_change",
         "position_dependent_gain" => "gain_per_position",
         _ => "stiffness",
     }

@@ -11,7 +11,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::data::{Series, difference};
 use super::fit::{Fit, Problem};
-use super::noise::{Mask, Noise};
+use super::noise::{Colours, Mask, Noise};
 use super::screen::Bench;
 use super::structure::Instance;
 
@@ -98,7 +98,12 @@ pub(crate) fn adequacy(
     before: Option<&Fit>,
 ) -> Option<Adequacy> {
     let mut fit = fit.clone();
-    let noise = Noise::estimate(&fit.residual, problem.data.outputs, &problem.mask, 1);
+    let noise = Noise::estimate(
+        &fit.residual,
+        problem.data.outputs,
+        &problem.mask,
+        Colours::Few,
+    );
     let sensitivities = fit.sensitivities(problem);
     let bench = Bench::new(problem, &fit, &noise, sensitivities)?;
     let mut tests = Vec::new();
@@ -120,7 +125,7 @@ pub(crate) fn adequacy(
         return None;
     }
     let left = bench.left;
-    let whitened = noise.whiten(&fit.residual);
+    let whitened = noise.whiten(&fit.residual, &problem.mask);
     tests.push(line(&whitened, &problem.mask));
     // As many tests, one level: Bonferroni's bound.
     let count = tests.len() as f64;
@@ -144,7 +149,10 @@ pub(crate) fn adequacy(
         share: shown.explained / left,
         of_removed: before.map_or(f64::INFINITY, |before| {
             // What was there is measured in the same metric.
-            let there = square(&noise.whiten(&before.residual), &problem.mask);
+            let there = square(
+                &noise.whiten(&before.residual, &problem.mask),
+                &problem.mask,
+            );
             let now = square(&whitened, &problem.mask);
             (shown.explained / (there - now).max(1e-12 * left)).min(MOST)
         }),

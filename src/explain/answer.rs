@@ -63,12 +63,12 @@ impl Answer<'_> {
         let model = &finding.model;
         let shown = self.output_that_shows(boring, model);
         let (input_names, output_names) = self.names();
-        let squares = locate::excess(&boring.residual, &model.noise);
+        let squares = locate::excess(&boring.residual, &model.noise, &self.mask);
         let effects = match &finding.weak {
             Some(proof) => self.drive_effects(proof),
             None => self.effects(&problem, model),
         };
-        let (fit, effect_size, heldout_gain) = self.proof(&problem, boring, model, shown);
+        let (fit, effect_size, heldout_gain) = self.proof(boring, model, shown);
         let mut effects = effects;
         if let Some(first) = effects.first_mut() {
             first.evidence.heldout_gain = heldout_gain;
@@ -121,7 +121,11 @@ impl Answer<'_> {
             alternatives,
             location,
             fit,
-            parameters: self.parameter_changes(boring),
+            parameters: if verdict == Verdict::Consistent {
+                Vec::new()
+            } else {
+                self.parameter_changes(&problem, model)
+            },
             remaining: match &finding.weak {
                 Some(proof) => proof.remaining(),
                 None => self.remaining(&problem, model),
@@ -176,7 +180,6 @@ impl Answer<'_> {
 
     fn proof(
         &self,
-        problem: &Problem,
         boring: &Fit,
         model: &Fit,
         shown: usize,
@@ -200,40 +203,14 @@ impl Answer<'_> {
             structure_share,
         };
         let train = prove::steps(data, &train_steps, &self.mask, shown, None);
-        let (train_mask, test_mask) = prove::split(data, &self.mask);
-        let (refit_parameters, refit_model) = match &self.finding.weak {
-            Some(proof) => proof.heldout.clone().unzip(),
-            None => rayon::join(
-                || prove::refit(problem, parameters, &train_mask),
-                || prove::refit(problem, model, &train_mask),
-            ),
-        };
-        let heldout = match (&refit_parameters, &refit_model) {
-            (Some(p), Some(m)) => Some(prove::steps(
-                data,
-                &prove::Steps {
-                    simulation: &given.residual,
-                    parameters_only: &p.residual,
-                    augmented: &m.residual,
-                    structure_share,
-                },
-                &test_mask,
-                shown,
-                Some(self.seed),
-            )),
-            _ => None,
-        };
-        let heldout_gain = match (&refit_parameters, &refit_model) {
-            _ if self.finding.weak.is_some() => self
-                .finding
-                .weak
-                .as_ref()
-                .and_then(|proof| proof.heldout_gain),
-            (Some(p), Some(m)) => Some(
-                p.noise.deviance(&p.residual, &test_mask)
-                    - m.noise.deviance(&m.residual, &test_mask),
-            ),
-            _ => None,
+        let aside = &self.finding.heldout;
+        let counts = aside.iter().flatten().any(|counts| *counts);
+        let heldout =
+            counts.then(|| prove::steps(data, &train_steps, aside, shown, Some(self.seed)));
+        let deviance = |fit: &Fit| fit.noise.deviance(&fit.residual, aside);
+        let heldout_gain = match &self.finding.weak {
+            Some(proof) => proof.heldout_gain,
+            None => counts.then(|| deviance(parameters) - deviance(model)),
         };
         let square = |f: f64| f * f;
         let lost = |f: &super::explanation::FitFigure| square((100.0 - f.fit_percent) / 100.0);
@@ -385,7 +362,8 @@ impl Answer<'_> {
         (0..self.data().outputs)
             .map(|o| NoiseFound {
                 output: self.outputs()[o].name.clone(),
-                autoregression: model.noise.ar[o].clone(),
+                autoregression: model.noise.colours[o].ar.clone(),
+                moving_average: model.noise.colours[o].ma.clone(),
                 innovation_std: model.noise.scale[o],
                 degrees_of_freedom: model
                     .noise

@@ -220,12 +220,15 @@ pub struct FitTable {
 /// A property of the simulation that the recording contradicts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ParameterChange {
-    /// What: `natural frequency 1`, `static gain y1/u1`.
+    /// What: `natural frequency`, `time constant 2`, `static gain y1/u1`.
     pub name: String,
     /// In the simulation.
     pub simulation: f64,
     /// In the recording.
     pub recording: f64,
+    /// Standard deviation of what the recording says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub std: Option<f64>,
     /// Unit.
     pub unit: String,
 }
@@ -277,6 +280,9 @@ pub struct NoiseFound {
     pub output: String,
     /// Autoregression `v[k] = -a1 v[k-1] - ... + e[k]`.
     pub autoregression: Vec<f64>,
+    /// `c1, c2, ...` of `v[k] + a1 v[k-1] + ... = e[k] + c1 e[k-1] + ...`: slow and white noise together have one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub moving_average: Vec<f64>,
     /// Scale of `e`.
     pub innovation_std: f64,
     /// Degrees of freedom of its distribution; absent for a Gaussian.

@@ -14,7 +14,7 @@ use nalgebra::DVector;
 
 use self::gauss_newton::Jacobian;
 use super::data::{Data, Series};
-use super::noise::{MOST_ORDER, Mask, Noise, sum_of_squares};
+use super::noise::{Colours, Mask, Noise, sum_of_squares};
 use super::structure::Structure;
 
 /// How hard a fit tries.
@@ -65,22 +65,22 @@ pub(crate) struct Problem<'a> {
     pub data: &'a Data,
     pub mask: Mask,
     pub scale: Vec<f64>,
-    /// Largest order of the noise model.
-    pub noise_order: usize,
+    /// Which noise models are tried.
+    pub colours: Colours,
 }
 
 impl<'a> Problem<'a> {
-    /// All samples count but the first few, from which a whitening filter starts.
+    /// All samples count.
     pub fn new(data: &'a Data) -> Self {
         let mask = data
             .outputs_as_series()
-            .map(|y| (0..y.len()).map(|k| k >= MOST_ORDER).collect())
+            .map(|y| vec![true; y.len()])
             .collect();
         Self {
             data,
             mask,
             scale: data.output_scale(),
-            noise_order: MOST_ORDER,
+            colours: Colours::All,
         }
     }
 
@@ -114,7 +114,7 @@ impl<'a> Problem<'a> {
 
     /// Noise model of a residual.
     pub fn noise(&self, residual: &Series) -> Noise {
-        Noise::estimate(residual, self.data.outputs, &self.mask, self.noise_order)
+        Noise::estimate(residual, self.data.outputs, &self.mask, self.colours)
     }
 }
 
@@ -152,7 +152,7 @@ impl Fit {
         let residual = problem.data.residual(&simulated);
         let noise = problem.noise(&residual);
         let deviance = noise.deviance(&residual, &problem.mask);
-        let free = structure.len() + noise.len();
+        let free = structure.free_len() + noise.len();
         let steps = slopes::first_steps(&theta);
         Some(Self {
             structure,
@@ -197,7 +197,7 @@ impl Fit {
             fit.descend(problem, &noise, effort, None);
             fit.noise = problem.noise(&fit.residual);
             fit.deviance = fit.noise.deviance(&fit.residual, &problem.mask);
-            fit.free = fit.structure.len() + fit.noise.len();
+            fit.free = fit.structure.free_len() + fit.noise.len();
             let settled = best
                 .as_ref()
                 .is_some_and(|b| (b.deviance - fit.deviance).abs() < 0.2);

@@ -108,6 +108,38 @@ fn impulse_size(plant: &Plant, output: usize) -> f64 {
     total.max(1e-300)
 }
 
+/// What a constant push through `direction` does to `row` of the state, over what input `input` does: the input that
+/// balances the push at standstill. The limit at low frequency, because a plant that integrates has no gain at none.
+pub(crate) fn static_equivalent(
+    plant: &Plant,
+    row: &[f64],
+    input: usize,
+) -> Option<StaticEquivalent> {
+    /// How far from one on the real axis the responses are compared: far beyond the slowest pole, and well above rounding.
+    const NEAR_STANDSTILL: f64 = 1e-6;
+    let n = plant.states;
+    let shifted = nalgebra::DMatrix::identity(n, n) * (1.0 + NEAR_STANDSTILL) - plant.a_matrix();
+    let weights = shifted
+        .transpose()
+        .lu()
+        .solve(&nalgebra::DVector::from_column_slice(row))?;
+    let weights: Vec<f64> = weights.iter().copied().collect();
+    let of_input = dot(&weights, &plant.b_column(input));
+    let size: f64 = weights
+        .iter()
+        .zip(plant.b_column(input))
+        .map(|(w, b)| (w * b).abs())
+        .sum();
+    (of_input.is_finite() && of_input.abs() > 1e-9 * size).then(|| StaticEquivalent {
+        row: weights.iter().map(|w| w / of_input).collect(),
+    })
+}
+
+/// Row that turns the direction of a push into the input that balances it.
+pub(crate) struct StaticEquivalent {
+    pub row: Vec<f64>,
+}
+
 /// Sign that lets a positive matched amplitude push the rate up.
 pub(crate) fn matched_sign(plant: &Plant, rate: &[f64], input: usize) -> f64 {
     if dot(rate, &plant.b_column(input)) < 0.0 {

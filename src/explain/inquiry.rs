@@ -10,7 +10,8 @@ use super::noise::Mask;
 use super::plausible::{add_free_twins, plant_may_stay, pulls, reaches, sane};
 use super::refine::{FURTHER, REFINEMENTS, decides_within, derived, finer_steps};
 use super::search::{Boring, Ranked, single_effects};
-use super::second::{self, heldout_gain, pair, with_feedthrough};
+use super::second::{self, pair, validated_gain, with_feedthrough};
+use super::simulation::Known;
 use super::structure::Structure;
 use crate::log::spacing;
 
@@ -64,6 +65,8 @@ pub(crate) struct Finding {
     pub coarse: Option<(usize, f64)>,
     pub adequacy: Option<Adequacy>,
     pub count: usize,
+    /// Samples that were set aside before anything was looked at.
+    pub heldout: Mask,
     /// What effects that were not found would have had to be: size in the output over its standard deviation.
     pub detectable: Vec<(&'static Definition, super::structure::Instance, f64)>,
     /// What was decided by the averaged equation of motion.
@@ -91,11 +94,13 @@ impl Finding {
 
 /// Runs the whole inquiry. `structure` is the simulation as it is known.
 pub(crate) fn inquire(
-    data: &Data,
-    structure: &Structure,
+    known: &Known,
     allowed: &(dyn Fn(&Definition) -> bool + Sync),
 ) -> Option<(Finding, Mask)> {
+    let (data, structure) = (&known.data, &known.structure);
     let mut problem = Problem::new(data);
+    let heldout;
+    (problem.mask, heldout) = super::prove::set_aside(data, &problem.mask);
     let said = structure.simulate(&structure.given(), data)?;
     let freezes = if allowed(effects::find("sensor_freeze", "")?) {
         frozen(data, &said)
@@ -104,12 +109,14 @@ pub(crate) fn inquire(
     };
     for freeze in &freezes {
         let mask = &mut problem.mask[freeze.segment * data.outputs + freeze.output];
-        // The whitening filter looks back over its order.
-        let to = (freeze.to + super::noise::MOST_ORDER).min(mask.len());
-        mask[freeze.from + 1..to].fill(false);
+        mask[freeze.from + 1..freeze.to].fill(false);
     }
     let count = problem.count();
-    let mut boring = Boring::fit(&problem, structure)?;
+    let refit = known
+        .identified
+        .then(|| output_error_refit(&problem))
+        .flatten();
+    let mut boring = Boring::fit(&problem, structure, refit.as_ref())?;
     // An identified baseline never asked for a direct feedthrough: without it any law makes up for it.
     if let Some(direct) = with_feedthrough(&problem, &boring.full) {
         boring.full = direct;
@@ -131,6 +138,7 @@ pub(crate) fn inquire(
         coarse: coarse.map(|(output, step, _)| (output, step)),
         adequacy: None,
         count,
+        heldout,
         detectable: Vec::new(),
         weak: None,
     };
@@ -179,11 +187,11 @@ pub(crate) fn inquire(
         } else {
             &finding.boring.near
         };
-        let expected = super::prove::SHARE * (before.criterion(count) - r.criterion).max(gain);
+        let all = (before.criterion(count) - r.criterion).max(gain);
         gain > needed
             && (gain > BEYOND_DOUBT
-                || heldout_gain(&problem, before, &r.fit)
-                    .is_some_and(|held| held > least_heldout(expected)))
+                || validated_gain(&problem, before, &r.fit)
+                    .is_some_and(|held| held.gain > least_heldout(held.share * all)))
             && reaches(&r.fit, &finding.boring.full)
     });
     if let Some(best) = best {
@@ -257,13 +265,44 @@ pub(crate) fn inquire(
             Verdict::Unexplained
         } else if !finding.freezes.is_empty() || finding.coarse.is_some() {
             Verdict::Named
-        } else if finding.boring.given.criterion(count) <= base + 1e-9 {
+        } else if finding.boring.given.criterion(count) <= base + 1e-9
+            || is_as_identified(known, &problem, &finding.boring)
+        {
             Verdict::Consistent
         } else {
             Verdict::Parameters
         };
     }
     Some((finding, problem.mask))
+}
+
+/// Probability of a larger difference between two recordings of one plant, below which its parameters are said to have
+/// changed.
+const SAME_PLANT: f64 = 1e-3;
+
+/// Whether an identified simulation differs from the best fit by no more than both are uncertain by.
+fn is_as_identified(known: &Known, problem: &Problem, boring: &Boring) -> bool {
+    known.uncertainty.as_ref().is_some_and(|uncertainty| {
+        uncertainty
+            .p_value(problem, &boring.full)
+            .is_some_and(|p| p > SAME_PLANT)
+    })
+}
+
+/// A linear plant of one input and output by simulation error, from which parameters may be fitted: what predicts one step
+/// ahead may be of another order, unstable or poor in simulation.
+fn output_error_refit(problem: &Problem) -> Option<Structure> {
+    let data = problem.data;
+    if data.signals() != 1 || data.outputs != 1 || !data.constant {
+        return None;
+    }
+    let (plant, _) = super::rebaseline::rebaseline(data, 0)?;
+    let (initial, _) = super::baseline::initial_states(&plant, data)?;
+    Some(Structure {
+        plant_free: true,
+        initial_free: true,
+        ..super::simulation::bare(&plant, &initial)
+    })
 }
 
 /// What blocks that were not fitted must show of a gain of which `expected` falls to their share: twice a log

@@ -23,9 +23,9 @@ const BANDS: usize = 16;
 
 /// Squares of the residual under the noise that is left beside the best explanation: 1 in the mean where nothing is
 /// missing. One series an output and segment.
-pub(crate) fn excess(residual: &Series, noise: &Noise) -> Series {
+pub(crate) fn excess(residual: &Series, noise: &Noise, mask: &Mask) -> Series {
     noise
-        .whiten(residual)
+        .whiten(residual, mask)
         .iter()
         .map(|e| e.iter().map(|v| (v * v).min(MOST_TIMES)).collect())
         .collect()

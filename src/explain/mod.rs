@@ -30,6 +30,7 @@ mod answer;
 mod augmented;
 mod baseline;
 mod cascade;
+mod changes;
 mod coordinates;
 mod curve;
 mod data;
@@ -65,6 +66,7 @@ mod start;
 mod structure;
 mod tanks;
 mod templates;
+mod uncertainty;
 mod weak;
 mod words;
 

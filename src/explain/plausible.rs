@@ -123,7 +123,7 @@ pub(crate) fn add_free_twins(
                 .extend_from_slice(r.fit.structure.new_effects());
             let linear = r.fit.structure.effect_offset(r.fit.structure.first_new());
             let mut theta = full.given();
-            if r.fit.structure.initial_free {
+            if r.fit.structure.initial_free && full.states() == r.fit.structure.states() {
                 let from = full.coordinates.len();
                 let states = full.states() * full.initial.len();
                 theta[from..from + states].copy_from_slice(&r.fit.theta[..states]);

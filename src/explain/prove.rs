@@ -8,35 +8,66 @@ use super::explanation::{FitFigure, FitSteps};
 use super::fit::{Effort, Fit, Problem};
 use super::noise::Mask;
 
-/// Blocks that are held out, spread over the recording.
+/// Blocks that are set aside, spread over each recording, and the share of it that they make up: enough for the figures of
+/// the proof, and little enough to miss.
 const BLOCKS: usize = 5;
-/// Share of the recording that they make up.
-pub(crate) const SHARE: f64 = 0.25;
+const SHARE: f64 = 0.15;
+/// Blocks of the rest that a candidate is tried on while candidates are compared, between those that are set aside.
+const INNER_BLOCKS: usize = 4;
+const INNER_SHARE: f64 = 0.2;
 /// Draws of the bootstrap.
 const DRAWS: usize = 500;
 /// Pieces that it draws, in total: each many correlation times long.
 const PIECES: usize = 40;
 
-/// Blocks `(segment, from, to)` that are held out.
-pub(crate) fn blocks(data: &Data) -> Vec<(usize, usize, usize)> {
+/// Blocks `(segment, from, to)`, `count` in each segment, that make up `share` of it, centred at `centre(block)` of it.
+fn spread(
+    data: &Data,
+    count: usize,
+    share: f64,
+    centre: impl Fn(f64) -> f64,
+) -> Vec<(usize, usize, usize)> {
     let mut list = Vec::new();
     for (s, segment) in data.segments.iter().enumerate() {
         let n = segment.samples();
-        let length = (SHARE * n as f64 / BLOCKS as f64) as usize;
-        for b in 0..BLOCKS {
-            let centre = (b as f64 + 0.5) / BLOCKS as f64 * n as f64;
-            let from = (centre - length as f64 / 2.0).max(0.0) as usize;
+        let length = (share * n as f64 / count as f64) as usize;
+        for b in 0..count {
+            let from = (centre(b as f64) * n as f64 - length as f64 / 2.0).max(0.0) as usize;
             list.push((s, from, (from + length).min(n)));
         }
     }
     list
 }
 
-/// The mask with the blocks taken out, and that with nothing else.
-pub(crate) fn split(data: &Data, mask: &Mask) -> (Mask, Mask) {
+/// Blocks `(segment, from, to)` that are set aside before anything is looked at, and used once, for the proof.
+pub(crate) fn blocks(data: &Data) -> Vec<(usize, usize, usize)> {
+    spread(data, BLOCKS, SHARE, |b| (b + 0.5) / BLOCKS as f64)
+}
+
+/// Blocks in the middle between those.
+fn inner_blocks(data: &Data) -> Vec<(usize, usize, usize)> {
+    spread(data, INNER_BLOCKS, INNER_SHARE, |b| {
+        (b + 1.0) / (INNER_BLOCKS + 1) as f64
+    })
+}
+
+/// The mask without the blocks that are set aside, and with nothing else.
+pub(crate) fn set_aside(data: &Data, mask: &Mask) -> (Mask, Mask) {
+    split(data, mask, &blocks(data))
+}
+
+/// The same of the blocks that candidates are tried on, and their share of the values.
+pub(crate) fn inner(data: &Data, mask: &Mask) -> (Mask, Mask, f64) {
+    let (train, test) = split(data, mask, &inner_blocks(data));
+    let count = |mask: &Mask| mask.iter().flatten().filter(|keep| **keep).count() as f64;
+    let share = count(&test) / count(mask).max(1.0);
+    (train, test, share)
+}
+
+fn split(data: &Data, mask: &Mask, blocks: &[(usize, usize, usize)]) -> (Mask, Mask) {
     let mut train = mask.clone();
     let mut test: Mask = mask.iter().map(|m| vec![false; m.len()]).collect();
-    for (s, from, to) in blocks(data) {
+    for &(s, from, to) in blocks {
         for o in 0..data.outputs {
             let series = s * data.outputs + o;
             for k in from..to {
@@ -230,10 +261,10 @@ mod tests {
     }
 
     #[test]
-    fn a_quarter_is_held_out_in_blocks_all_over() {
+    fn blocks_are_set_aside_all_over() {
         let data = data();
         let mask = vec![vec![true; N]];
-        let (train, test) = split(&data, &mask);
+        let (train, test) = set_aside(&data, &mask);
         let held = test[0].iter().filter(|keep| **keep).count();
         assert_eq!(held, (SHARE * N as f64) as usize);
         assert!(train[0].iter().zip(&test[0]).all(|(a, b)| a != b));
@@ -242,6 +273,10 @@ mod tests {
             assert_eq!(fifth.iter().filter(|keep| **keep).count(), held / 5);
             assert!(!fifth[0] && !fifth[N / 5 - 1]);
         }
+        // What candidates are tried on is never of them.
+        let (_, tried, share) = inner(&data, &train);
+        assert!((share * (1.0 - SHARE) / INNER_SHARE - 1.0).abs() < 0.01);
+        assert!(tried[0].iter().zip(&test[0]).all(|(a, b)| !(*a && *b)));
     }
 
     /// Errors of 0.9, 0.5 and 0.1 of the output: figures, noise floor, and an improvement over other parameters, not over the

@@ -57,9 +57,7 @@ pub fn explain(
                 .adequacy
                 .is_none_or(|a| a.p_value > LEVEL || a.share < MOSTLY_NOISE)
     });
-    let ordinary = (!settled)
-        .then(|| inquire(&known.data, &known.structure, &allowed))
-        .flatten();
+    let ordinary = (!settled).then(|| inquire(&known, &allowed)).flatten();
     let (known, finding, mask) = match (drive, ordinary) {
         (Some((drive, averaged, counted)), Some((finding, mask)))
             if tells_more(

@@ -12,7 +12,6 @@ use rayon::prelude::*;
 use super::data::{Data, Series};
 use super::effects::{self, Definition};
 use super::fit::{Effort, Fit, Problem};
-use super::noise::MOST_ORDER;
 use super::plant::Plant;
 use super::plausible::sane;
 use super::rebaseline::of_order;
@@ -163,14 +162,8 @@ pub(crate) fn candidates(
     alone
 }
 
-/// A fit that the first samples count in as well: else the initial state of a plant of this order is what nobody sees.
 fn fitted(problem: &Problem, structure: Structure, theta: Vec<f64>) -> Option<Fit> {
-    let mut whole = problem.clone();
-    for mask in &mut whole.mask {
-        let first = MOST_ORDER.min(mask.len());
-        mask[..first].fill(true);
-    }
-    let fit = Fit::run(&whole, structure, theta, None, Effort::FINAL)?;
+    let fit = Fit::run(problem, structure, theta, None, Effort::FINAL)?;
     Fit::at(problem, fit.structure, fit.theta)
 }
 

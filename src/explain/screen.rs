@@ -11,7 +11,7 @@ use super::data::{Data, Series};
 use super::effects::{self, Action, Clock, Definition, Sense};
 use super::fit::{Fit, Problem};
 use super::functionals::{Functionals, dot, matched_sign};
-use super::noise::{Noise, kept};
+use super::noise::Noise;
 use super::plant::Plant;
 use super::run::{Grid, run};
 use super::structure::{Direction, Instance, Signal, Structure};
@@ -113,7 +113,7 @@ impl<'a> Bench<'a> {
         sensitivities: Vec<Option<Series>>,
     ) -> Option<Self> {
         let plant = basis.structure.plant(&basis.theta);
-        let whitened = noise.whiten(&basis.residual);
+        let whitened = noise.whiten(&basis.residual, &problem.mask);
         let mut weights = Vec::new();
         let mut e = Vec::new();
         for (column, mask) in whitened.iter().zip(&problem.mask) {
@@ -168,7 +168,7 @@ impl<'a> Bench<'a> {
 
     /// Whitened, weighted, without the values that do not count.
     pub fn flatten(&self, series: &Series) -> Vec<f64> {
-        let mut flat = kept(&self.noise.whiten(series), &self.problem.mask);
+        let mut flat = self.noise.whiten_kept(series, &self.problem.mask);
         for (v, w) in flat.iter_mut().zip(&self.weights) {
             *v *= w;
         }
@@ -196,7 +196,7 @@ impl<'a> Bench<'a> {
 
     /// Frequencies (Hz) of the largest lines of the residual's periodogram, whitened, all outputs together.
     fn lines(&self) -> Vec<f64> {
-        let whitened = self.noise.whiten(&self.basis.residual);
+        let whitened = self.noise.whiten(&self.basis.residual, &self.problem.mask);
         let n = whitened.iter().map(Vec::len).max().unwrap_or(0);
         if n < 32 {
             return Vec::new();
@@ -248,7 +248,8 @@ impl<'a> Bench<'a> {
         let gram = multiply_tn(&columns, &columns);
         let inner = columns.tr_mul(&self.residual);
         let mut leads = Vec::new();
-        if let Some((coefficients, gained)) = solve(&gram, &inner, &before) {
+        let curve = template.instance.definition.is_curve();
+        if let (false, Some((coefficients, gained))) = (curve, solve(&gram, &inner, &before)) {
             leads.extend(self.lead(template, template.instance, &coefficients, gained, m));
         }
         let Action::Force(..) = template.instance.definition.action else {
@@ -313,12 +314,27 @@ impl<'a> Bench<'a> {
             }
         }
         let mut shape = template.shape.clone();
-        for (&i, c) in definition.linear.iter().zip(coefficients) {
-            shape[i] = match definition.action {
-                // The template held the start value; the coefficient multiplies it.
-                Action::Input(_) => shape[i] * c,
-                _ => *c,
-            };
+        if definition.is_curve() {
+            // Its coefficients are the amplitude.
+            let amplitude = std::mem::replace(&mut start[0], 1.0);
+            definition
+                .linear
+                .iter()
+                .for_each(|i| shape[*i] *= amplitude);
+        } else if coefficients.len() == 1 {
+            // The template held the start values; the coefficient multiplies them.
+            let scaled = matches!(definition.action, Action::Input(_));
+            for &i in definition.linear {
+                shape[i] = if scaled {
+                    shape[i] * coefficients[0]
+                } else {
+                    coefficients[0]
+                };
+            }
+        } else {
+            for (&i, c) in definition.linear.iter().zip(coefficients) {
+                shape[i] = *c;
+            }
         }
         if definition.linear.is_empty() && definition.grows_with_first() {
             // Twice the width does about twice as much: the coefficient corrects the template's.
@@ -442,7 +458,7 @@ fn clock(data: &Data, segment: usize) -> Clock {
 mod tests {
     use super::*;
     use crate::explain::fixtures::{effect, recorded, spring};
-    use crate::explain::noise::MOST_ORDER;
+    use crate::explain::noise::Colours;
     use crate::explain::structure::Structure;
 
     /// The lead of an effect at the place where it acts, beside the plant as it is.
@@ -452,7 +468,7 @@ mod tests {
         let plain = spring(Vec::new());
         let mut basis = Fit::at(&problem, plain, Vec::new()).unwrap();
         let id = truth.effects[0].definition.id;
-        let noise = Noise::estimate(&basis.residual, 1, &problem.mask, MOST_ORDER);
+        let noise = Noise::estimate(&basis.residual, 1, &problem.mask, Colours::All);
         let leads = screen(&problem, &mut basis, &[noise], &|d| d.id == id)
             .swap_remove(0)
             .into_iter();

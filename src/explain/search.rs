@@ -37,8 +37,13 @@ pub(crate) struct Boring {
 }
 
 impl Boring {
-    /// All of them around `structure`, the simulation as it is known.
-    pub fn fit(problem: &Problem, structure: &Structure) -> Option<Self> {
+    /// All of them around `structure`, the simulation as it is known; `refit` is another plant from which its parameters may
+    /// be fitted as well.
+    pub fn fit(
+        problem: &Problem,
+        structure: &Structure,
+        refit: Option<&Structure>,
+    ) -> Option<Self> {
         let count = problem.count();
         let fit = |structure: Structure, theta: Vec<f64>| {
             Fit::run(problem, structure, theta, None, Effort::FINAL)
@@ -57,7 +62,13 @@ impl Boring {
             || run(with(false, false)),
             || rayon::join(|| run(with(false, true)), || run(with(true, true))),
         );
-        let (given, full) = (given?, full?);
+        let (given, mut full) = (given?, full?);
+        if let Some(other) = refit.and_then(|refit| fit(refit.clone(), refit.given())) {
+            full.better_of(other, count);
+        }
+        if let Some(about) = about_an_operating_point(problem, structure, &full) {
+            full.better_of(about, count);
+        }
         let mut near = given.clone();
         near.better_of(initial?, count);
         let strict = near.clone();
@@ -94,6 +105,49 @@ impl Boring {
             &self.near
         }
     }
+}
+
+/// Other parameters about an operating point: where a plant with other gains is linear about a level, its outputs are
+/// shifted as well, and that is no offset of a sensor. Only where the level lies within what the inputs visit: there the
+/// shift is less than the other gains make of twice the standard deviations of the inputs.
+fn about_an_operating_point(problem: &Problem, given: &Structure, full: &Fit) -> Option<Fit> {
+    const WITHIN: f64 = 2.0;
+    let data = problem.data;
+    let offset = effects::find("sensor_offset", "")?;
+    let mut structure = full.structure.clone();
+    structure.adjusted = data.outputs;
+    structure
+        .effects
+        .extend((0..data.outputs).map(|channel| Instance {
+            definition: offset,
+            channel,
+            signal: Signal::Output(channel),
+            direction: Direction::Free,
+        }));
+    let mut theta = full.theta.clone();
+    theta.extend(std::iter::repeat_n(0.0, data.outputs));
+    let fit = Fit::run(problem, structure, theta, Some(&full.noise), Effort::FINAL)?;
+    let gain = |plant: &super::plant::Plant| {
+        let n = plant.states;
+        let inverse = (nalgebra::DMatrix::identity(n, n) - plant.a_matrix()).try_inverse()?;
+        Some(plant.c_matrix() * inverse * plant.b_matrix() + plant.d_matrix())
+    };
+    let change = gain(&fit.structure.plant(&fit.theta))? - gain(&given.coordinates.given)?;
+    let mean = |j: usize| {
+        let values = || data.segments.iter().flat_map(|s| s.inputs[j].iter());
+        values().sum::<f64>() / values().count().max(1) as f64
+    };
+    let spread = data.input_scale();
+    let signals = data.signals();
+    let within = (0..data.outputs).all(|o| {
+        let at_mean: f64 = (0..data.inputs).map(|j| change[(o, j)] * mean(j)).sum();
+        let first = fit.structure.effect_offset(fit.structure.known.len() + o);
+        let reach: f64 = (0..signals)
+            .map(|j| (change[(o, j)] * spread[j]).abs())
+            .sum();
+        (at_mean + fit.theta[first]).abs() <= WITHIN * reach
+    });
+    within.then_some(fit)
 }
 
 /// Most numbers that are adjusted together.
@@ -204,7 +258,7 @@ pub(crate) fn single_effects(
         jobs.push(if *index == 0 {
             let full = &boring.full.structure;
             let mut theta = full.given();
-            if frozen.structure.initial_free {
+            if frozen.structure.initial_free && full.states() == frozen.structure.states() {
                 let from = full.coordinates.len();
                 let states = frozen.structure.states() * frozen.structure.initial.len();
                 theta[from..from + states].copy_from_slice(&frozen.theta[..states]);

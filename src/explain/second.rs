@@ -6,6 +6,7 @@ use super::data::Series;
 use super::effects::Definition;
 use super::fit::{Effort, Fit, Problem};
 use super::inquiry::{penalty, polished};
+use super::noise::{Colours, Noise};
 use super::plausible::sane;
 use super::refine::{REFINEMENTS, derived};
 use super::search::{Ranked, second_effects};
@@ -110,8 +111,8 @@ pub(crate) fn pair(
     let shows = single - both >= SECOND_VARIANCE * (without - single).max(0.0);
     // Blocks that were not fitted make up a share of the recording: a real gain shows there in proportion.
     let seen_again = || {
-        heldout_gain(problem, &best.fit, &found.fit)
-            .is_some_and(|held| held > 0.5 * super::prove::SHARE * gain)
+        validated_gain(problem, &best.fit, &found.fit)
+            .is_some_and(|held| held.gain > 0.5 * held.share * gain)
     };
     (enough && shows && seen_again()).then_some(found.fit)
 }
@@ -157,18 +158,18 @@ pub(crate) fn with_feedthrough(problem: &Problem, fit: &Fit) -> Option<Fit> {
 /// Whether the residual foretells the inputs: its whitened values correlate with later innovations of an input.
 fn feedback(problem: &Problem, fit: &Fit) -> bool {
     let data = problem.data;
-    let e = fit.noise.whiten(&fit.residual);
+    let e = fit.noise.whiten(&fit.residual, &problem.mask);
     (0..data.signals()).any(|j| {
         let u: Series = data.segments.iter().map(|s| s.inputs[j].clone()).collect();
         let mask: Vec<Vec<bool>> = u.iter().map(|c| vec![true; c.len()]).collect();
-        let own = super::noise::Noise::estimate(&u, 1, &mask, super::noise::MOST_ORDER);
-        let w = own.whiten(&u);
+        let own = Noise::estimate(&u, 1, &mask, Colours::All);
+        let w = own.whiten(&u, &mask);
         (0..data.outputs).any(|o| {
             (1..=FEEDBACK_LAGS).any(|lag| {
                 let (mut sum, mut ee, mut ww, mut n) = (0.0, 0.0, 0.0, 0.0);
                 for (s, w) in w.iter().enumerate() {
                     let e = &e[s * data.outputs + o];
-                    for k in super::noise::MOST_ORDER..w.len().saturating_sub(lag) {
+                    for k in 0..w.len().saturating_sub(lag) {
                         sum += e[k] * w[k + lag];
                         ee += e[k] * e[k];
                         ww += w[k + lag] * w[k + lag];
@@ -182,15 +183,26 @@ fn feedback(problem: &Problem, fit: &Fit) -> bool {
     })
 }
 
-/// Decrease of the deviance from `a` to `b` on blocks that neither was fitted to.
-pub(crate) fn heldout_gain(problem: &Problem, a: &Fit, b: &Fit) -> Option<f64> {
-    let (train, test) = super::prove::split(problem.data, &problem.mask);
+/// Decrease of the deviance from `a` to `b` on blocks that neither is fitted to, over their share of all that is fitted:
+/// what the gain of all would be. The blocks that are set aside for the proof are not among them.
+pub(crate) fn validated_gain(problem: &Problem, a: &Fit, b: &Fit) -> Option<Validated> {
+    let (train, test, share) = super::prove::inner(problem.data, &problem.mask);
     let (a, b) = rayon::join(
         || super::prove::refit(problem, a, &train),
         || super::prove::refit(problem, b, &train),
     );
     let (a, b) = (a?, b?);
-    Some(a.noise.deviance(&a.residual, &test) - b.noise.deviance(&b.residual, &test))
+    Some(Validated {
+        gain: a.noise.deviance(&a.residual, &test) - b.noise.deviance(&b.residual, &test),
+        share,
+    })
+}
+
+/// What blocks of the fitted part say of a gain when they are left out of the fit.
+pub(crate) struct Validated {
+    pub gain: f64,
+    /// Their share of the fitted values.
+    pub share: f64,
 }
 
 /// Effects of one kind, of which a recording hardly holds two: misfit of the one would be called the other.

@@ -8,12 +8,13 @@ use super::data::{Data, Segment, Series};
 use super::effects::{Action, Definition};
 use super::error::ExplainError;
 use super::fit::{Effort, Fit, Problem};
+use super::noise::Colours;
 use super::offset::operating_point;
 use super::plant::Plant;
-use super::rebaseline::{MOST_DELAY, rebaseline, shifted};
 use super::run::MOST_STATES;
 use super::search::{Boring, single_effects};
 use super::structure::Structure;
+use super::uncertainty::Uncertainty;
 use crate::identify::Model;
 use crate::linalg::spectral_radius;
 use crate::log::{Channel, LARGEST_SIZE, Log};
@@ -37,6 +38,10 @@ pub(crate) struct Known {
     pub delays: Vec<usize>,
     /// The simulator is not linear and known by its outputs only: `data` is relative to what `structure` misses.
     pub relative: bool,
+    /// The simulation is a model that was identified from a recording.
+    pub identified: bool,
+    /// How well it is known, if it says so.
+    pub uncertainty: Option<Uncertainty>,
 }
 
 /// Samples that a state needs, so that blocks can be held out.
@@ -184,42 +189,6 @@ fn of_model(recordings: &[Log], model: &Model, name: &str) -> Result<Known, Expl
     };
     let mut data = data_of(recordings, &delays);
     let mut plant = Plant::from_state_space(system);
-    if model.summary.is_some() && system.inputs() == 1 && system.outputs() == 1 {
-        // Identified from data: a linear baseline is found again by simulation error.
-        let mut plain = data_of(recordings, &[0]);
-        trimmed(&mut plain);
-        for segment in &mut plain.segments {
-            let samples = segment.samples();
-            segment.inputs.push(vec![1.0; samples]);
-        }
-        plain.inputs += 1;
-        plain.constant = true;
-        // A delay of the wrong law helps no other: where the sign may be lost, none is put before everything.
-        let most_delay = if super::rectified::applies(&plain) {
-            0
-        } else {
-            MOST_DELAY
-        };
-        let mut found = rebaseline(&plain, most_delay);
-        if let Some((plant, delay)) = &found
-            && *delay > 0
-            && super::baseline::initial_states(plant, &shifted(&plain, *delay))
-                .is_some_and(|(_, missed)| super::tanks::miss_less(&plain, missed))
-        {
-            found = rebaseline(&plain, 0);
-        }
-        if let Some((plant, delay)) = found {
-            let data = shifted(&plain, delay);
-            if let Some((initial, _)) = super::baseline::initial_states(&plant, &data) {
-                return Ok(Known {
-                    structure: bare(&plant, &initial),
-                    data,
-                    delays: vec![delay],
-                    relative: false,
-                });
-            }
-        }
-    }
     if Coordinates::new(&plant).given.states == 0 {
         return Err(ExplainError::Static {
             name: name.to_owned(),
@@ -234,11 +203,18 @@ fn of_model(recordings: &[Log], model: &Model, name: &str) -> Result<Known, Expl
         add_constant(&mut data, &mut plant, &u_level, &y_level);
     }
     let initial = vec![vec![0.0; plant.states]; data.segments.len()];
+    let structure = bare(&plant, &initial);
+    let uncertainty = model
+        .covariance
+        .as_ref()
+        .and_then(|covariance| Uncertainty::of(model, covariance));
     Ok(Known {
-        structure: bare(&plant, &initial),
+        structure,
         data,
         delays,
         relative: false,
+        identified: model.summary.is_some(),
+        uncertainty,
     })
 }
 
@@ -383,6 +359,8 @@ fn of_outputs(recordings: &[Log], logs: &[Log]) -> Result<Known, ExplainError> {
             structure,
             delays,
             relative: false,
+            identified: false,
+            uncertainty: None,
         });
     }
     if let Some(known) = about_a_level(&data, &noise_free, &delays) {
@@ -414,6 +392,8 @@ fn about_a_level(data: &Data, noise_free: &Data, delays: &[usize]) -> Option<Kno
         data,
         delays: delays.to_vec(),
         relative: false,
+        identified: false,
+        uncertainty: None,
     })
 }
 
@@ -426,8 +406,8 @@ fn learn_nonlinear(
     simulator: &Simulator,
 ) -> Option<Known> {
     let mut problem = Problem::new(noise_free);
-    problem.noise_order = 0;
-    let boring = Boring::fit(&problem, structure)?;
+    problem.colours = Colours::White;
+    let boring = Boring::fit(&problem, structure, None)?;
     let physical = |d: &Definition| {
         d.persists
             && matches!(
@@ -486,6 +466,8 @@ fn learn_nonlinear(
         data,
         structure,
         relative: true,
+        identified: false,
+        uncertainty: None,
     })
 }
 

@@ -165,6 +165,27 @@ impl Structure {
         self.effect_offset(self.effects.len())
     }
 
+    /// Numbers that are fitted.
+    pub fn free_len(&self) -> usize {
+        self.held().iter().filter(|held| !**held).count()
+    }
+
+    /// Which numbers stay where they are: where a curve is looked at, and the amplitude beside its coefficients.
+    pub fn held(&self) -> Vec<bool> {
+        let mut held = vec![false; self.linear_len()];
+        for effect in &self.effects[self.free_effects()] {
+            let amplitudes = effect.amplitudes(self.states());
+            held.extend(std::iter::repeat_n(
+                effect.definition.is_curve(),
+                amplitudes,
+            ));
+            held.extend(effect.definition.parameters.iter().map(|p| p.held));
+            let coefficients = effect.coefficients(self.states(), self.outputs());
+            held.extend(std::iter::repeat_n(false, coefficients));
+        }
+        held
+    }
+
     /// Where the numbers of effect `index` begin (those of known effects have no place while they are fixed).
     pub fn effect_offset(&self, index: usize) -> usize {
         self.linear_len()
@@ -190,12 +211,19 @@ impl Structure {
         &theta[from..from + self.effects[index].len(self.states(), self.outputs())]
     }
 
-    /// The linear numbers, and those of the known effects, as they were given.
+    /// The linear numbers, and those of the known effects, as they were given; nothing is adjusted.
     pub fn given(&self) -> Vec<f64> {
         let mut theta = self.given_linear();
         if self.plant_free {
             theta.extend(self.known.iter().flatten());
         }
+        // Adjustments of nothing.
+        let adjusted = &self.effects[self.known.len()..self.first_new().min(self.effects.len())];
+        let numbers = adjusted
+            .iter()
+            .map(|e| e.len(self.states(), self.outputs()))
+            .sum();
+        theta.extend(std::iter::repeat_n(0.0, numbers));
         theta
     }
 

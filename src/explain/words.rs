@@ -182,12 +182,16 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
             .iter()
             .take(4)
             .map(|p| {
+                let recording = Quantity {
+                    value: p.recording,
+                    std: p.std,
+                    unit: p.unit.clone(),
+                };
                 format!(
-                    "{} {} -> {} {}",
+                    "{} {} -> {}",
                     p.name,
                     number(p.simulation),
-                    number(p.recording),
-                    p.unit
+                    quantity(&recording)
                 )
             })
             .collect();

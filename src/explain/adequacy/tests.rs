@@ -72,9 +72,12 @@ fn a_law_that_was_missed_is_seen_in_its_size() {
         let missed = adequacy(&problem, &without, &without, None).unwrap();
         assert!(missed.p_value < LEVEL && !missed.holds(), "{missed:?}");
         // What the law removes is the structure that was there: hats in the position are near that law, and what chance explains is taken off.
-        let noise = Noise::estimate(&without.residual, 1, &problem.mask, 1);
-        let there = square(&noise.whiten(&without.residual), &problem.mask);
-        let now = square(&noise.whiten(&with.residual), &problem.mask);
+        let noise = Noise::estimate(&without.residual, 1, &problem.mask, Colours::Few);
+        let there = square(
+            &noise.whiten(&without.residual, &problem.mask),
+            &problem.mask,
+        );
+        let now = square(&noise.whiten(&with.residual, &problem.mask), &problem.mask);
         let structure = 1.0 - now / there;
         assert!(
             missed.share > 0.45 * structure && missed.share < 1.02 * structure,
@@ -95,8 +98,9 @@ fn a_law_that_was_missed_is_seen_in_its_size() {
         let tenth = Fit::at(&problem, spring(vec![effect("cubic_stiffness", "")]), tenth).unwrap();
         let bare = Fit::at(&problem, spring(Vec::new()), Vec::new()).unwrap();
         let left = adequacy(&problem, &tenth, &bare, Some(&bare)).unwrap();
-        let noise = Noise::estimate(&tenth.residual, 1, &problem.mask, 1);
-        let whitened = |fit: &Fit| square(&noise.whiten(&fit.residual), &problem.mask);
+        let noise = Noise::estimate(&tenth.residual, 1, &problem.mask, Colours::Few);
+        let whitened =
+            |fit: &Fit| square(&noise.whiten(&fit.residual, &problem.mask), &problem.mask);
         let (before, now) = (whitened(&bare), whitened(&tenth));
         let expected = left.share * now / (before - now);
         assert!(!left.holds(), "{left:?}");

@@ -46,6 +46,51 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: reached_lower,
     },
     Definition {
+        id: "input_saturation",
+        variant: "range",
+        name: "saturation of the input on both sides, each with a limit of its own",
+        equation: "u_eff = clamp(u, lower_limit, upper_limit)",
+        parameters: &[
+            Parameter::real("lower_limit", Unit::Input),
+            Parameter::real("upper_limit", Unit::Input),
+        ],
+        mimics: &[],
+        linear: &[],
+        persists: true,
+        action: Action::Input(saturate_range),
+        starts: reached_range,
+    },
+    Definition {
+        id: "input_dead_zone",
+        variant: "range",
+        name: "dead zone of the input with an end of its own on each side",
+        equation: "u_eff = u - clamp(u, lower_end, upper_end)",
+        parameters: &[
+            Parameter::real("lower_end", Unit::Input),
+            Parameter::real("upper_end", Unit::Input),
+        ],
+        mimics: &[],
+        linear: &[],
+        persists: true,
+        action: Action::Input(dead_range),
+        starts: dead_ranges,
+    },
+    Definition {
+        id: "input_curve",
+        variant: "",
+        name: "characteristic of the input that is not a straight line",
+        equation: "u_eff = u + c2 P2(s) + c3 P3(s) + c4 P4(s) + c5 P5(s), s = (u - centre)/half_range, P Legendre polynomials",
+        parameters: &super::law::curve_parameters(Unit::Input, Unit::Input),
+        mimics: &[Mimic {
+            effect: "law",
+            experiment: "steps of one size from several levels of the input at one level of the output",
+        }],
+        linear: super::law::CURVE_COEFFICIENTS,
+        persists: true,
+        action: Action::Input(curve),
+        starts: |seen| super::law::curves(&seen.channel, 0.05),
+    },
+    Definition {
         id: "input_dead_zone",
         variant: "",
         name: "dead zone of the input",
@@ -133,7 +178,7 @@ pub(super) static ENTRIES: &[Definition] = &[
     Definition {
         id: "actuator_lag",
         variant: "",
-        name: "lag of the actuator",
+        name: "lag of the actuator or of the sensor, which a linear plant does not tell apart,",
         equation: "tau du_eff/dt + u_eff = u",
         parameters: &[Parameter::positive("time_constant", Unit::Second)],
         mimics: &[Mimic {
@@ -264,6 +309,24 @@ fn saturate_lower(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
     }
 }
 
+fn saturate_range(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+    for u in u {
+        *u = u.max(p[0]).min(p[1]);
+    }
+}
+
+fn dead_range(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+    for u in u {
+        *u -= u.max(p[0]).min(p[1]);
+    }
+}
+
+fn curve(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+    for u in u {
+        *u += super::law::curve(p, *u);
+    }
+}
+
 fn dead_zone(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
     for u in u {
         *u -= u.clamp(-p[0], p[0]);
@@ -358,6 +421,37 @@ fn reached_lower(seen: &Observed) -> Vec<Vec<f64>> {
     [0.4, 0.15, 0.05]
         .map(|q| vec![level(&seen.channel, q, |v| v)])
         .to_vec()
+}
+
+fn reached_range(seen: &Observed) -> Vec<Vec<f64>> {
+    [
+        (0.05, 0.95),
+        (0.15, 0.85),
+        (0.3, 0.7),
+        (0.03, 0.8),
+        (0.2, 0.97),
+    ]
+    .map(|(low, high)| {
+        vec![
+            level(&seen.channel, low, |v| v),
+            level(&seen.channel, high, |v| v),
+        ]
+    })
+    .to_vec()
+}
+
+fn dead_ranges(seen: &Observed) -> Vec<Vec<f64>> {
+    let size = level(&seen.channel, 0.7, f64::abs).max(1e-12);
+    [
+        (0.0, 0.05),
+        (0.0, 0.2),
+        (-0.05, 0.0),
+        (-0.2, 0.0),
+        (-0.05, 0.2),
+        (-0.2, 0.05),
+    ]
+    .map(|(low, high)| vec![low * size, high * size])
+    .to_vec()
 }
 
 fn widths(seen: &Observed) -> Vec<Vec<f64>> {

@@ -36,12 +36,33 @@ pub(super) static ENTRIES: &[Definition] = &[
         action: Action::Force(stiffness, Needs::Position, Sense::Either),
         starts: |seen| seen.change_times.iter().map(|t| vec![*t]).collect(),
     },
+    Definition {
+        id: "mass_change",
+        variant: "",
+        name: "mass (inertia, capacity) that changes at some time",
+        equation: "dv/dt -> dv/dt m/(m + dm) for t >= t0",
+        parameters: &[Parameter::real("from", Unit::Second)],
+        mimics: &[Mimic {
+            effect: "gain_change",
+            experiment: "a constant input before and after: a gain moves the level that is reached, a mass does not",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Force(inertia, Needs::Rate, Sense::Either),
+        starts: |seen| seen.change_times.iter().map(|t| vec![*t]).collect(),
+    },
 ];
 
 fn gain(p: &[f64], u: &mut [f64], _: &mut [f64], clock: &Clock) {
     for (k, u) in u.iter_mut().enumerate() {
         *u *= 1.0 + p[0] * clock.share_after(k, p[1]);
     }
+}
+
+/// A unit of mass takes the force that accelerates it off the rest.
+fn inertia(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    let acceleration = (motion.rate_free - motion.rate) / motion.clock.step;
+    -acceleration * motion.clock.share_after(motion.sample, p[0])
 }
 
 fn stiffness(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {

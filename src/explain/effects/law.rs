@@ -1,5 +1,7 @@
 //! What laws see: a clock, the motion over one sample, and the signals that starting values come from.
 
+use super::{Parameter, Unit};
+
 /// Time of the samples of one segment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Clock {
@@ -85,6 +87,59 @@ pub(crate) struct Observed {
     pub frequencies: Vec<f64>,
 }
 
+/// Coefficients of a curve among its numbers: those of the polynomials of order two to five.
+pub(super) const CURVE_COEFFICIENTS: &[usize] = &[2, 3, 4, 5];
+
+/// Numbers of a static curve: where it is looked at, which stays, and its coefficients, in the unit of its value.
+pub(super) const fn curve_parameters(of: Unit, value: Unit) -> [Parameter; 6] {
+    [
+        Parameter::real("centre", of).held(),
+        Parameter::positive("half_range", of).held(),
+        Parameter::real("c2", value),
+        Parameter::real("c3", value),
+        Parameter::real("c4", value),
+        Parameter::real("c5", value),
+    ]
+}
+
+/// `c2 P2(s) + c3 P3(s) + c4 P4(s) + c5 P5(s)` with Legendre's polynomials and `s = (v - centre)/half_range`; a straight
+/// line beyond the range that was seen. The constant and the straight line belong to the plant.
+pub(super) fn curve(p: &[f64], v: f64) -> f64 {
+    let s = (v - p[0]) / p[1];
+    let inside = s.clamp(-1.0, 1.0);
+    let (mut before, mut now) = (1.0, inside);
+    let (mut slope_before, mut slope) = (0.0, 1.0);
+    let (mut value, mut rise) = (0.0, 0.0);
+    for (order, c) in (1..).zip(&p[2..6]) {
+        // Bonnet's recursion, and its derivative.
+        let n = f64::from(order);
+        let next = ((2.0 * n + 1.0) * inside * now - n * before) / (n + 1.0);
+        let slope_next = slope_before + (2.0 * n + 1.0) * now;
+        (before, now) = (now, next);
+        (slope_before, slope) = (slope, slope_next);
+        value += c * now;
+        rise += c * slope;
+    }
+    value + rise * (s - inside)
+}
+
+/// Curves to start from, over the range of `values`, of `size` times it: bent one way, and bent both ways.
+pub(super) fn curves(values: &[f64], size: f64) -> Vec<Vec<f64>> {
+    let (low, high) = (level(values, 0.002, |v| v), level(values, 0.998, |v| v));
+    let half = 0.5 * (high - low);
+    if half.is_nan() || half <= 0.0 {
+        return Vec::new();
+    }
+    let c = size * half;
+    [[c, 0.0, 0.0, 0.0], [0.0, c, 0.0, 0.0]]
+        .map(|coefficients| {
+            let mut numbers = vec![0.5 * (low + high), half];
+            numbers.extend(coefficients);
+            numbers
+        })
+        .to_vec()
+}
+
 /// Quantile `q` of `values` (0..1), by sorting a copy of at most about 4000 of them.
 pub(crate) fn level(values: &[f64], q: f64, of: fn(f64) -> f64) -> f64 {
     let stride = values.len().div_ceil(4000).max(1);
@@ -101,4 +156,25 @@ pub(crate) fn level(values: &[f64], q: f64, of: fn(f64) -> f64) -> f64 {
 pub(crate) fn decay(x: f64) -> f64 {
     const NOTHING_LEFT: f64 = 700.0;
     if x > NOTHING_LEFT { 0.0 } else { (-x).exp() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_is_the_sum_of_its_polynomials() {
+        let p = [3.0, 2.0, 0.7, -0.3, 0.2, 0.1];
+        let literal = |s: f64| {
+            0.7 * 0.5 * (3.0 * s * s - 1.0) - 0.3 * 0.5 * (5.0 * s.powi(3) - 3.0 * s)
+                + 0.2 * 0.125 * (35.0 * s.powi(4) - 30.0 * s * s + 3.0)
+                + 0.1 * 0.125 * (63.0 * s.powi(5) - 70.0 * s.powi(3) + 15.0 * s)
+        };
+        for s in [-1.0, -0.4, 0.0, 0.3, 1.0] {
+            assert!((curve(&p, 3.0 + 2.0 * s) - literal(s)).abs() < 1e-12, "{s}");
+        }
+        // Beyond the range a straight line, without a corner.
+        let slope = (literal(1.0) - literal(1.0 - 1e-6)) / 1e-6;
+        assert!((curve(&p, 3.0 + 2.0 * 1.5) - literal(1.0) - 0.5 * slope).abs() < 1e-4);
+    }
 }

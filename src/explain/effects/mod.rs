@@ -74,6 +74,8 @@ pub struct Parameter {
     pub lower: f64,
     /// Largest value allowed.
     pub upper: f64,
+    /// Stays where it starts: it says where something is looked at and is not fitted.
+    pub held: bool,
 }
 
 impl Parameter {
@@ -85,6 +87,7 @@ impl Parameter {
             logarithmic: true,
             lower: 1e-12,
             upper: 1e12,
+            held: false,
         }
     }
 
@@ -96,7 +99,13 @@ impl Parameter {
             logarithmic: false,
             lower: -1e12,
             upper: 1e12,
+            held: false,
         }
+    }
+
+    /// The same, not fitted.
+    pub(crate) const fn held(self) -> Self {
+        Self { held: true, ..self }
     }
 
     /// A number between bounds.
@@ -107,6 +116,7 @@ impl Parameter {
             logarithmic: false,
             lower,
             upper,
+            held: false,
         }
     }
 }
@@ -226,6 +236,11 @@ impl Definition {
         self.parameters
             .first()
             .is_some_and(|p| matches!(p.name, "delay" | "time_constant" | "width" | "half_gap"))
+    }
+
+    /// Whether it is a force with coefficients of its own, which need no amplitude beside them.
+    pub(crate) fn is_curve(&self) -> bool {
+        matches!(self.action, Action::Force(..)) && !self.linear.is_empty()
     }
 
     /// Which of its parameters is the time in the recording at which it begins.

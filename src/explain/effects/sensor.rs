@@ -28,6 +28,33 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: reached_upper,
     },
     Definition {
+        id: "sensor_saturation",
+        variant: "lower",
+        name: "saturation of the sensor on the lower side",
+        equation: "y = max(y_true, limit)",
+        parameters: &[Parameter::real("limit", Unit::Position)],
+        mimics: MIMICS,
+        linear: &[],
+        persists: true,
+        action: Action::Sensor(saturate_lower),
+        starts: reached_lower,
+    },
+    Definition {
+        id: "sensor_saturation",
+        variant: "range",
+        name: "saturation of the sensor on both sides, each with a limit of its own",
+        equation: "y = clamp(y_true, lower_limit, upper_limit)",
+        parameters: &[
+            Parameter::real("lower_limit", Unit::Position),
+            Parameter::real("upper_limit", Unit::Position),
+        ],
+        mimics: MIMICS,
+        linear: &[],
+        persists: true,
+        action: Action::Sensor(saturate_range),
+        starts: reached_range,
+    },
+    Definition {
         id: "sensor_offset",
         variant: "",
         name: "offset of the sensor",
@@ -172,6 +199,18 @@ fn saturate_upper(p: &[f64], y: &mut [f64], _: &Clock) {
     }
 }
 
+fn saturate_lower(p: &[f64], y: &mut [f64], _: &Clock) {
+    for y in y {
+        *y = y.max(p[0]);
+    }
+}
+
+fn saturate_range(p: &[f64], y: &mut [f64], _: &Clock) {
+    for y in y {
+        *y = y.max(p[0]).min(p[1]);
+    }
+}
+
 fn offset(p: &[f64], y: &mut [f64], _: &Clock) {
     for y in y {
         *y += p[0];
@@ -213,6 +252,23 @@ fn rectify(_: &[f64], y: &mut [f64], _: &Clock) {
 fn reached(seen: &Observed) -> Vec<Vec<f64>> {
     [0.5, 0.7, 0.85, 0.93, 0.97, 0.99]
         .map(|q| vec![level(&seen.channel, q, f64::abs).max(1e-12)])
+        .to_vec()
+}
+
+fn reached_lower(seen: &Observed) -> Vec<Vec<f64>> {
+    [0.3, 0.15, 0.07, 0.02]
+        .map(|q| vec![level(&seen.channel, q, |v| v)])
+        .to_vec()
+}
+
+fn reached_range(seen: &Observed) -> Vec<Vec<f64>> {
+    [(0.05, 0.95), (0.15, 0.85), (0.03, 0.8), (0.2, 0.97)]
+        .map(|(low, high)| {
+            vec![
+                level(&seen.channel, low, |v| v),
+                level(&seen.channel, high, |v| v),
+            ]
+        })
         .to_vec()
 }
 

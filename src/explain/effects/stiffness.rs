@@ -192,6 +192,21 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: |_| Vec::new(),
     },
     Definition {
+        id: "law",
+        variant: "",
+        name: "force or flow that depends on the output along a curve",
+        equation: "F = c2 P2(s) + c3 P3(s) + c4 P4(s) + c5 P5(s), s = (x - centre)/half_range, P Legendre polynomials",
+        parameters: &super::law::curve_parameters(Unit::Position, Unit::Input),
+        mimics: &[Mimic {
+            effect: "input_curve",
+            experiment: "steps of one size of the input at several levels of the output",
+        }],
+        linear: super::law::CURVE_COEFFICIENTS,
+        persists: true,
+        action: Action::Force(curve, Needs::Position, Sense::Either),
+        starts: |seen| super::law::curves(&seen.channel, 1.0),
+    },
+    Definition {
         id: "position_dependent_gain",
         variant: "",
         name: "gain that depends on position",
@@ -221,6 +236,10 @@ const STOP_MIMICS: &[Mimic] = &[
         experiment: "a slow ramp over the whole travel: a stop has a corner, a cubic spring has none",
     },
 ];
+
+fn curve(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    super::law::curve(p, motion.middle())
+}
 
 fn no_shape(_: &Observed) -> Vec<Vec<f64>> {
     vec![vec![]]

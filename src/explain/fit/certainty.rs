@@ -20,8 +20,9 @@ impl Fit {
     /// How well the numbers are known.
     pub fn certainty(&mut self, problem: &Problem) -> Option<Certainty> {
         let mut slopes = self.sensitivities(problem);
+        let held = self.structure.held();
         for (i, slope) in slopes.iter_mut().enumerate() {
-            if slope.is_none() {
+            if slope.is_none() && !held[i] {
                 *slope = self.secant(problem, i);
             }
         }

@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::Problem;
 use crate::explain::data::{Series, difference};
-use crate::explain::noise::{Noise, extend_with_kept, kept};
+use crate::explain::noise::Noise;
 use crate::linalg::multiply_tn;
 
 /// Added to a curvature of one: numbers that do the same are held to the smallest change that does it.
@@ -27,9 +27,7 @@ impl Jacobian {
         }
         let mut flat = Vec::with_capacity(rows * used.len());
         for slope in slopes.iter().flatten() {
-            for (series, mask) in noise.whiten(slope).iter().zip(&problem.mask) {
-                extend_with_kept(&mut flat, series, mask);
-            }
+            flat.extend(noise.whiten_kept(slope, &problem.mask));
         }
         flat.iter().all(|v| v.is_finite()).then(|| Self {
             columns: DMatrix::from_vec(rows, used.len(), flat),
@@ -49,7 +47,7 @@ impl Jacobian {
         after: &Series,
     ) {
         let change = difference(after, before);
-        let missed = kept(&noise.whiten(&change), &problem.mask);
+        let missed = noise.whiten_kept(&change, &problem.mask);
         let step = DVector::from_iterator(self.used.len(), self.used.iter().map(|i| step[*i]));
         let missed = DVector::from_vec(missed) - &self.columns * &step;
         let along: Vec<f64> = self
@@ -81,7 +79,7 @@ impl Jacobian {
         only: Option<&[bool]>,
     ) -> NormalEquations {
         let rows = self.columns.nrows();
-        let e = kept(&noise.whiten(residual), &problem.mask);
+        let e = noise.whiten_kept(residual, &problem.mask);
         let mut weights: Vec<f64> = e.iter().map(|e| noise.weight(*e)).collect();
         for (weight, pass) in weights.iter_mut().zip(only.unwrap_or_default()) {
             if !pass {

@@ -42,12 +42,17 @@ impl Fit {
     /// Change of the simulation with each number: a series a number, and none for one that moves nothing.
     pub fn sensitivities(&mut self, problem: &Problem) -> Vec<Option<Series>> {
         let bounds = self.structure.bounds();
+        let held = self.structure.held();
         let mut steps = std::mem::take(&mut self.steps);
         let columns = steps
             .par_iter_mut()
             .with_max_len(1)
             .enumerate()
-            .map(|(i, step)| self.sensitivity(problem, i, bounds[i].1, step))
+            .map(|(i, step)| {
+                (!held[i])
+                    .then(|| self.sensitivity(problem, i, bounds[i].1, step))
+                    .flatten()
+            })
             .collect();
         self.steps = steps;
         columns

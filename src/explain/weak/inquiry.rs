@@ -51,8 +51,6 @@ const SIDES: [&str; 3] = ["coulomb_friction", "stribeck_friction", "input_dead_z
 pub(crate) struct Proof {
     pub equation: Equation,
     pub tethered: Tethered,
-    /// Fits without the held-out blocks: other parameters only, and with what was found.
-    pub heldout: Option<(Fit, Fit)>,
     /// Decrease of twice the negative log likelihood on held-out windows.
     pub heldout_gain: Option<f64>,
     /// Largest difference of the law's coefficients between the halves, in standard deviations.
@@ -161,10 +159,11 @@ struct Ranking {
 
 fn ranking(
     data: &Data,
+    mask: &Mask,
     reading: Reading,
     allowed: &dyn Fn(&Definition) -> bool,
 ) -> Option<Ranking> {
-    let windows = Windows::choose(data, reading)?;
+    let windows = inside(&Windows::choose(data, reading)?, mask);
     let forms = Form::all(reading, allowed);
     let plain = Equation {
         reading,
@@ -240,12 +239,14 @@ pub(crate) fn attempt(
         return None;
     }
     let data = whole(recordings);
-    let problem = Problem::new(&data);
+    let mut problem = Problem::new(&data);
+    let heldout;
+    (problem.mask, heldout) = prove::set_aside(&data, &problem.mask);
     let given = given(known, &data, &problem)?;
     let missed = error_over(&given, &problem.mask) / problem.scale[0];
     let rankings: Vec<Ranking> = [Reading::Position, Reading::Velocity]
         .into_iter()
-        .filter_map(|reading| ranking(&data, reading, allowed))
+        .filter_map(|reading| ranking(&data, &problem.mask, reading, allowed))
         .collect();
     let chosen = rankings
         .into_iter()
@@ -260,7 +261,7 @@ pub(crate) fn attempt(
         return None;
     }
     let decided = decide(&chosen, &data, &problem)?;
-    let finding = finding(&chosen, &plain, decided, given, &problem)?;
+    let finding = finding(&chosen, &plain, decided, given, &problem, heldout)?;
     // A way that leads to a worse free run than the simulation had is the wrong one.
     let better = error_over(&finding.model, &problem.mask)
         <= error_over(&finding.boring.given, &problem.mask) * NO_WORSE;
@@ -269,6 +270,8 @@ pub(crate) fn attempt(
         structure: finding.boring.given.structure.clone(),
         delays: vec![0],
         relative: false,
+        identified: known.identified,
+        uncertainty: None,
         data: data.clone(),
     };
     better.then_some((known, finding, mask))
@@ -284,7 +287,7 @@ struct Decided {
 fn decide(chosen: &Ranking, data: &Data, problem: &Problem) -> Option<Decided> {
     let plain = best_of(&chosen.candidates, 0)?;
     let windows = &chosen.windows;
-    let (train, test) = prove::split(data, &problem.mask);
+    let (train, test, _) = prove::inner(data, &problem.mask);
     let (train, test) = (inside(windows, &train), inside(windows, &test));
     let foretells = |candidate: &Candidate, base: &Candidate| {
         let held = |c: &Candidate| {
@@ -394,6 +397,7 @@ fn finding(
     decided: Decided,
     given: Fit,
     problem: &Problem,
+    heldout: Mask,
 ) -> Option<Finding> {
     let data = problem.data;
     let windows = &chosen.windows;
@@ -417,19 +421,10 @@ fn finding(
     };
     let adequacy = adequacy(windows, data, &equation, &regression, before);
     let adequate = adequacy.as_ref().is_none_or(holds);
-    let (train, test) = prove::split(data, &problem.mask);
-    let heldout = (|| {
-        let own = inside(windows, &train);
-        let refit = |e: &Equation| {
-            let (fit, _) = tethered(e, &own, data, &train)?;
-            as_fit(problem, e, &fit)
-        };
-        Some((refit(&plain.equation)?, refit(&equation)?))
-    })();
     let heldout_gain = (|| {
-        let (own, other) = (inside(windows, &train), inside(windows, &test));
+        let other = inside(&Windows::choose(data, chosen.windows.reading)?, &heldout);
         let error = |e: &Equation| {
-            let fit = e.fit(&own, data, false)?;
+            let fit = e.fit(windows, data, false)?;
             foretold(e, fit.coefficients.as_slice(), &other, data)
         };
         let independent =
@@ -484,11 +479,11 @@ fn finding(
         coarse: None,
         adequacy,
         count: problem.count(),
+        heldout,
         detectable: Vec::new(),
         weak: Some(Box::new(Proof {
             equation,
             tethered: fit,
-            heldout,
             heldout_gain,
             halves_disagree,
             adequacy,

@@ -94,12 +94,14 @@ pub(super) fn noise(of: &Explanation) -> Vec<[String; 4]> {
 }
 
 fn colour(of: &NoiseFound) -> String {
-    match of.autoregression.as_slice() {
-        [] => "white".to_owned(),
-        a => {
-            let numbers: Vec<String> = a.iter().map(|a| fixed(*a, 2)).collect();
-            format!("coloured, a = {}", numbers.join(", "))
-        }
+    let listed = |name: &str, numbers: &[f64]| {
+        let numbers: Vec<String> = numbers.iter().map(|n| fixed(*n, 2)).collect();
+        format!("{name} = {}", numbers.join(", "))
+    };
+    match (of.autoregression.as_slice(), of.moving_average.as_slice()) {
+        ([], []) => "white".to_owned(),
+        (a, []) => format!("coloured, {}", listed("a", a)),
+        (a, c) => format!("coloured, {}, {}", listed("a", a), listed("c", c)),
     }
 }
 

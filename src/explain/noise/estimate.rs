@@ -1,0 +1,642 @@
+//! Which colour a residual has.
+//!
+//! Autoregressions of all orders by Levinson and Durbin, and mixed models of low order by Whittle's likelihood on a
+//! periodogram that is averaged over bins: a step of Fisher's scoring then costs some hundred operations and no pass
+//! over the data. Starts are those of Hannan and Rissanen (1982) and a grid of slow poles. The choice among all is by
+//! Schwarz's criterion with the exact likelihood of each.
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use realfft::RealFftPlanner;
+
+use super::colour::{Colour, MOST_MIXED, MOST_ORDER, reflections};
+use super::{Mask, product};
+use crate::explain::data::Series;
+
+/// Mixed models that are tried, `(autoregressive order, moving average order)`: slow and white noise is the first; the
+/// next are what a process of second order leaves beside white noise, alone or with a slow one.
+const MIXED: [(usize, usize); 4] = [(1, 1), (2, 1), (2, 2), (3, 3)];
+/// Slow poles and zeros from which the first is started as well.
+const SLOW: [(f64, f64); 6] = [
+    (0.8, 0.4),
+    (0.95, 0.6),
+    (0.95, 0.85),
+    (0.99, 0.7),
+    (0.99, 0.93),
+    (0.998, 0.95),
+];
+/// Order of the autoregression whose errors stand for the innovations in the starts.
+const LONG: usize = 20;
+/// Gaps up to this length are bridged by a straight line where the colour is estimated; longer ones are left empty.
+const SHORT_GAP: usize = 8;
+/// Lowest frequencies that make a bin each, and the growth of the bins above.
+const SINGLE_BINS: usize = 16;
+const BIN_GROWTH: f64 = 1.04;
+/// Steps of a fit, and the decrease of the deviance at which it ends.
+const STEPS: usize = 30;
+const SETTLED: f64 = 1e-3;
+/// Poles and zeros further out than this many samples' memory are not distinguished from the circle.
+const LONGEST_MEMORY: f64 = 1e5;
+/// Values that each coefficient needs.
+const VALUES_A_COEFFICIENT: usize = 12;
+
+/// Which models are tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Colours {
+    White,
+    /// Autoregressions of order two at most, and mixed ones up to (2, 2): a long one learns slow misfit as colour.
+    Few,
+    All,
+}
+
+impl Colours {
+    fn most_order(self) -> usize {
+        match self {
+            Self::White => 0,
+            Self::Few => 2,
+            Self::All => MOST_ORDER,
+        }
+    }
+
+    fn mixed(self) -> &'static [(usize, usize)] {
+        match self {
+            Self::White => &[],
+            Self::Few => &MIXED[..3],
+            Self::All => &MIXED,
+        }
+    }
+}
+
+/// The colour of output `output` of a residual.
+pub(super) fn colour(
+    residual: &Series,
+    outputs: usize,
+    output: usize,
+    mask: &Mask,
+    colours: Colours,
+) -> Colour {
+    let stretches: Vec<(&[f64], &[bool])> = residual
+        .iter()
+        .zip(mask)
+        .skip(output)
+        .step_by(outputs)
+        .map(|(v, m)| (v.as_slice(), m.as_slice()))
+        .collect();
+    let kept = || {
+        stretches
+            .iter()
+            .flat_map(|(v, m)| v.iter().zip(*m).filter(|(_, m)| **m).map(|(v, _)| *v))
+    };
+    let n = kept().count();
+    let most = colours.most_order().min(n / VALUES_A_COEFFICIENT);
+    if most == 0 {
+        return Colour::default();
+    }
+    // About the mean: a constant is an offset to be explained, not colour with a pole at one.
+    let mean = kept().sum::<f64>() / n as f64;
+    let filled: Vec<Vec<f64>> = stretches.iter().map(|(v, m)| bridged(v, m, mean)).collect();
+    let lags = if colours.mixed().is_empty() {
+        most
+    } else {
+        most.max(LONG.min(n / VALUES_A_COEFFICIENT))
+    };
+    let covariance = autocovariance(&filled, lags);
+    if covariance[0].is_nan() || covariance[0] <= 0.0 {
+        return Colour::default();
+    }
+    let (best, long) = levinson(&covariance, n, most, LONG);
+    let judged = |colour: Colour| {
+        let criterion = deviance(&colour, &stretches, mean) + colour.len() as f64 * (n as f64).ln();
+        (criterion, colour)
+    };
+    let mut best = judged(Colour::new(best, Vec::new()).unwrap_or_default());
+    if colours.mixed().is_empty() || n < VALUES_A_COEFFICIENT * LONG {
+        return best.1;
+    }
+    let Some(bins) = Bins::new(&filled, n) else {
+        return best.1;
+    };
+    let starts = Starts::new(&filled, &covariance, &long);
+    let mut lower: Option<(Vec<f64>, Vec<f64>)> = None;
+    for &(p, q) in colours.mixed() {
+        let mut tried: Vec<(Vec<f64>, Vec<f64>)> = starts.mixed(p, q).into_iter().collect();
+        if (p, q) == (1, 1) {
+            tried.extend(SLOW.map(|(pole, zero)| (vec![-pole], vec![-zero])));
+        }
+        if let Some((ar, ma)) = &lower {
+            // A little pole and a little zero more.
+            let grown = |list: &[f64], by: f64, to: usize| {
+                let mut list = list.to_vec();
+                while list.len() < to {
+                    list = multiplied(&list, by);
+                }
+                list
+            };
+            tried.push((grown(ar, -0.5, p), grown(ma, -0.3, q)));
+        }
+        let first = tried
+            .into_iter()
+            .filter_map(|(ar, ma)| Some((bins.deviance(&ar, &ma)?, ar, ma)))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, ar, ma)) = first else { continue };
+        let Some((ar, ma)) = bins.fitted(ar, ma) else {
+            continue;
+        };
+        let Some(colour) = inside(&ar)
+            .zip(inside(&ma))
+            .and_then(|(ar, ma)| Colour::new(ar, ma))
+        else {
+            continue;
+        };
+        lower = Some((colour.ar.clone(), colour.ma.clone()));
+        let mixed = judged(colour);
+        if mixed.0 < best.0 {
+            best = mixed;
+        }
+    }
+    best.1
+}
+
+/// A stretch less the mean; what does not count is bridged where short, else zero.
+fn bridged(v: &[f64], mask: &[bool], mean: f64) -> Vec<f64> {
+    let mut out: Vec<f64> = v
+        .iter()
+        .zip(mask)
+        .map(|(v, keep)| if *keep { v - mean } else { 0.0 })
+        .collect();
+    let mut k = 0;
+    while k < out.len() {
+        if mask[k] {
+            k += 1;
+            continue;
+        }
+        let from = k;
+        while k < out.len() && !mask[k] {
+            k += 1;
+        }
+        if from > 0 && k < out.len() && k - from <= SHORT_GAP {
+            let (a, b) = (out[from - 1], out[k]);
+            let length = (k - from + 1) as f64;
+            for i in from..k {
+                out[i] = a + (b - a) * (i - from + 1) as f64 / length;
+            }
+        }
+    }
+    out
+}
+
+/// Sums of lagged products.
+fn autocovariance(filled: &[Vec<f64>], lags: usize) -> Vec<f64> {
+    (0..=lags)
+        .map(|lag| {
+            filled
+                .iter()
+                .map(|v| product(v.get(lag..).unwrap_or_default(), v))
+                .sum()
+        })
+        .collect()
+}
+
+/// Levinson and Durbin: the order that Schwarz's criterion chooses up to `most`, and the order `long`.
+fn levinson(covariance: &[f64], count: usize, most: usize, long: usize) -> (Vec<f64>, Vec<f64>) {
+    let samples = count as f64;
+    let mut ar: Vec<f64> = Vec::new();
+    let mut at_long = Vec::new();
+    let mut variance = covariance[0];
+    let (mut best, mut least) = (Vec::new(), samples * variance.ln());
+    for order in 1..covariance.len() {
+        let mut reflection = covariance[order];
+        for (i, a) in ar.iter().enumerate() {
+            reflection += a * covariance[order - 1 - i];
+        }
+        let k = -reflection / variance;
+        if !k.is_finite() || k.abs() >= 1.0 {
+            break;
+        }
+        let before = ar.clone();
+        for (i, a) in ar.iter_mut().enumerate() {
+            *a += k * before[order - 2 - i];
+        }
+        ar.push(k);
+        variance *= 1.0 - k * k;
+        let criterion = samples * variance.ln() + order as f64 * samples.ln();
+        if criterion < least && order <= most {
+            least = criterion;
+            best = ar.clone();
+        }
+        if order <= long {
+            at_long = ar.clone();
+        }
+    }
+    (best, at_long)
+}
+
+/// `-2 log` likelihood with the best scale, less what is the same for all colours.
+fn deviance(colour: &Colour, stretches: &[(&[f64], &[bool])], mean: f64) -> f64 {
+    let (mut squares, mut count, mut determinant) = (0.0, 0usize, 0.0);
+    let mut white = Vec::new();
+    let mut centred = Vec::new();
+    for (v, mask) in stretches {
+        super::each_stretch(mask, |from, to| {
+            centred.clear();
+            centred.extend(v[from..to].iter().map(|v| v - mean));
+            white.clear();
+            colour.whiten(&centred, 1.0, &mut white);
+            squares += super::sum_of_squares(&white);
+            count += to - from;
+            determinant += colour.log_determinant(to - from);
+        });
+    }
+    count as f64 * (squares / count as f64).max(1e-300).ln() + determinant
+}
+
+/// Coefficients of `(1 + p1 z + ...) (1 + root z)`.
+fn multiplied(polynomial: &[f64], root: f64) -> Vec<f64> {
+    let at = |i: usize| {
+        if i == 0 {
+            1.0
+        } else {
+            polynomial.get(i - 1).copied().unwrap_or(0.0)
+        }
+    };
+    (1..=polynomial.len() + 1)
+        .map(|i| at(i) + root * at(i - 1))
+        .collect()
+}
+
+/// The polynomial of the same magnitude on the circle whose roots are inside of it.
+fn inside(polynomial: &[f64]) -> Option<Vec<f64>> {
+    if reflections(polynomial).is_some() {
+        return Some(polynomial.to_vec());
+    }
+    let n = polynomial.len();
+    let companion = DMatrix::from_fn(n, n, |i, j| {
+        if i == 0 {
+            -polynomial[j]
+        } else if i == j + 1 {
+            1.0
+        } else {
+            0.0
+        }
+    });
+    let most = 1.0 - 1.0 / LONGEST_MEMORY;
+    let mut product = vec![Complex64::new(1.0, 0.0)];
+    for mut root in crate::linalg::eigenvalues(&companion).ok()? {
+        if root.norm() > 1.0 {
+            root = root.conj().inv();
+        }
+        if root.norm() > most {
+            root *= most / root.norm();
+        }
+        let mut next = product.clone();
+        next.push(Complex64::new(0.0, 0.0));
+        for (i, p) in product.iter().enumerate() {
+            next[i + 1] -= p * root;
+        }
+        product = next;
+    }
+    Some(product[1..].iter().map(|c| c.re).collect())
+}
+
+/// Covariances at small lags of the values and of the errors of a long autoregression, for Hannan and Rissanen's regression.
+struct Starts {
+    /// `values[lag]`, `errors[lag]`: sums of `v[k] v[k-lag]`, `e[k] e[k-lag]`.
+    values: Vec<f64>,
+    errors: Vec<f64>,
+    /// `cross[MOST_MIXED + lag]`: sums of `v[k] e[k-lag]`.
+    cross: Vec<f64>,
+}
+
+impl Starts {
+    fn new(filled: &[Vec<f64>], covariance: &[f64], long: &[f64]) -> Self {
+        let filter = Colour::new(long.to_vec(), Vec::new()).unwrap_or_default();
+        let errors: Vec<Vec<f64>> = filled
+            .iter()
+            .map(|v| {
+                let mut e = Vec::with_capacity(v.len());
+                filter.whiten(v, 1.0, &mut e);
+                e
+            })
+            .collect();
+        let most = MOST_MIXED as isize;
+        let cross = (-most..=most)
+            .map(|lag| {
+                let back = lag.unsigned_abs();
+                filled
+                    .iter()
+                    .zip(&errors)
+                    .map(|(v, e)| {
+                        if lag >= 0 {
+                            product(v.get(back..).unwrap_or_default(), e)
+                        } else {
+                            product(v, e.get(back..).unwrap_or_default())
+                        }
+                    })
+                    .sum()
+            })
+            .collect();
+        Self {
+            values: covariance.iter().take(MOST_MIXED + 1).copied().collect(),
+            errors: autocovariance(&errors, MOST_MIXED),
+            cross,
+        }
+    }
+
+    /// Regression of a value on `p` values and `q` errors before it.
+    fn mixed(&self, p: usize, q: usize) -> Option<(Vec<f64>, Vec<f64>)> {
+        // `sum v[k-i] e[k-j]` is that of `v[k] e[k-(j-i)]`.
+        let cross = |i: usize, j: usize| self.cross.get(MOST_MIXED + j - i).copied();
+        let m = p + q;
+        let mut gram = DMatrix::zeros(m, m);
+        let mut right = DVector::zeros(m);
+        for i in 0..m {
+            for j in 0..m {
+                gram[(i, j)] = match (i < p, j < p) {
+                    (true, true) => *self.values.get(i.abs_diff(j))?,
+                    (false, false) => *self.errors.get(i.abs_diff(j))?,
+                    (true, false) => cross(i + 1, j - p + 1)?,
+                    (false, true) => cross(j + 1, i - p + 1)?,
+                };
+            }
+            right[i] = if i < p {
+                *self.values.get(i + 1)?
+            } else {
+                cross(0, i - p + 1)?
+            };
+            gram[(i, i)] *= 1.0 + 1e-9;
+        }
+        let solved = gram.cholesky()?.solve(&right);
+        let ar: Vec<f64> = solved.iter().take(p).map(|v| -v).collect();
+        let ma: Vec<f64> = solved.iter().skip(p).copied().collect();
+        inside(&ar).zip(inside(&ma))
+    }
+}
+
+/// A periodogram, averaged over bins.
+struct Bins {
+    /// Ordinates in each.
+    count: Vec<f64>,
+    power: Vec<f64>,
+    /// `exp(-i w k)`, `k = 1..=MOST_MIXED`.
+    turns: Vec<[Complex64; MOST_MIXED]>,
+}
+
+impl Bins {
+    fn new(filled: &[Vec<f64>], count: usize) -> Option<Self> {
+        let longest = filled.iter().map(Vec::len).max()?;
+        let top = longest / 2;
+        // Upper edge of each bin, in bins of the longest.
+        let mut edges: Vec<f64> = (1..=SINGLE_BINS.min(top)).map(|j| j as f64 + 0.5).collect();
+        while edges.last().is_some_and(|e| *e < top as f64) {
+            let last = edges[edges.len() - 1];
+            edges.push((last * BIN_GROWTH).max(last + 1.0));
+        }
+        let m = edges.len();
+        let (mut counts, mut powers, mut places) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
+        let share = filled.iter().map(Vec::len).sum::<usize>() as f64 / count as f64;
+        let mut planner = RealFftPlanner::<f64>::new();
+        for v in filled.iter().filter(|v| v.len() >= 16) {
+            let n = v.len();
+            let transform = planner.plan_fft_forward(n);
+            let mut input = v.clone();
+            let mut spectrum = transform.make_output_vec();
+            transform.process(&mut input, &mut spectrum).ok()?;
+            let mut bin = 0;
+            for (j, s) in spectrum.iter().enumerate().skip(1) {
+                let place = j as f64 * longest as f64 / n as f64;
+                while bin + 1 < m && place > edges[bin] {
+                    bin += 1;
+                }
+                // The last ordinate of an even number is one value, not two.
+                let weight = if 2 * j == n { 0.5 } else { 1.0 };
+                counts[bin] += weight;
+                powers[bin] += weight * s.norm_sqr() * share / n as f64;
+                places[bin] += weight * place;
+            }
+        }
+        let mut bins = Self {
+            count: Vec::with_capacity(m),
+            power: Vec::with_capacity(m),
+            turns: Vec::with_capacity(m),
+        };
+        for ((count, power), place) in counts.into_iter().zip(powers).zip(places) {
+            if count > 0.0 && power > 0.0 {
+                let w = std::f64::consts::TAU * place / count / longest as f64;
+                bins.count.push(count);
+                bins.power.push(power / count);
+                bins.turns.push(std::array::from_fn(|k| {
+                    Complex64::from_polar(1.0, -w * (k + 1) as f64)
+                }));
+            }
+        }
+        (bins.count.len() > 4 * MOST_MIXED).then_some(bins)
+    }
+
+    /// `1 + p1 e^(-iw) + ...`
+    fn value(polynomial: &[f64], turns: &[Complex64; MOST_MIXED]) -> Complex64 {
+        polynomial
+            .iter()
+            .zip(turns)
+            .fold(Complex64::new(1.0, 0.0), |sum, (p, t)| sum + t * *p)
+    }
+
+    /// Power over what the model says of its shape.
+    fn ratios(&self, ar: &[f64], ma: &[f64]) -> (Vec<f64>, f64) {
+        let mut logarithms = 0.0;
+        let ratios = self
+            .turns
+            .iter()
+            .zip(&self.power)
+            .zip(&self.count)
+            .map(|((turns, power), count)| {
+                let shape = Self::value(ma, turns).norm_sqr() / Self::value(ar, turns).norm_sqr();
+                logarithms += count * shape.ln();
+                power / shape
+            })
+            .collect();
+        (ratios, logarithms)
+    }
+
+    /// Twice Whittle's log likelihood, negative, with the best variance.
+    fn deviance(&self, ar: &[f64], ma: &[f64]) -> Option<f64> {
+        let (ratios, logarithms) = self.ratios(ar, ma);
+        let total: f64 = self.count.iter().sum();
+        let variance = ratios
+            .iter()
+            .zip(&self.count)
+            .map(|(r, m)| r * m)
+            .sum::<f64>()
+            / total;
+        let deviance = 2.0 * (logarithms + total * variance.ln());
+        deviance.is_finite().then_some(deviance)
+    }
+
+    /// Fisher's scoring with Levenberg's damping.
+    fn fitted(&self, mut ar: Vec<f64>, mut ma: Vec<f64>) -> Option<(Vec<f64>, Vec<f64>)> {
+        let (p, m) = (ar.len(), ar.len() + ma.len());
+        let mut least = self.deviance(&ar, &ma)?;
+        let mut damping = 1e-3;
+        let total: f64 = self.count.iter().sum();
+        for _ in 0..STEPS {
+            let (ratios, _) = self.ratios(&ar, &ma);
+            let variance = ratios
+                .iter()
+                .zip(&self.count)
+                .map(|(r, m)| r * m)
+                .sum::<f64>()
+                / total;
+            let mut curvature = DMatrix::<f64>::zeros(m, m);
+            let mut gradient = DVector::<f64>::zeros(m);
+            // The derivatives less their mean: the variance takes that up.
+            let mut rows: Vec<DVector<f64>> = Vec::with_capacity(ratios.len());
+            let mut mean = DVector::<f64>::zeros(m);
+            for (turns, count) in self.turns.iter().zip(&self.count) {
+                let (a, c) = (Self::value(&ar, turns).inv(), Self::value(&ma, turns).inv());
+                let row = DVector::from_fn(m, |i, _| {
+                    if i < p {
+                        -2.0 * (turns[i] * a).re
+                    } else {
+                        2.0 * (turns[i - p] * c).re
+                    }
+                });
+                mean += &row * (*count / total);
+                rows.push(row);
+            }
+            for ((row, ratio), count) in rows.iter().zip(&ratios).zip(&self.count) {
+                let row = row - &mean;
+                gradient += &row * (count * (ratio / variance - 1.0));
+                curvature += &row * row.transpose() * *count;
+            }
+            let before = least;
+            for _ in 0..8 {
+                let mut damped = curvature.clone();
+                for i in 0..m {
+                    damped[(i, i)] *= 1.0 + damping;
+                    damped[(i, i)] += 1e-12;
+                }
+                let step = damped.cholesky()?.solve(&gradient);
+                let next_ar: Vec<f64> = ar.iter().zip(step.iter()).map(|(a, s)| a + s).collect();
+                let next_ma: Vec<f64> = ma
+                    .iter()
+                    .zip(step.iter().skip(p))
+                    .map(|(c, s)| c + s)
+                    .collect();
+                match self.deviance(&next_ar, &next_ma) {
+                    Some(now) if now < least => {
+                        (ar, ma, least) = (next_ar, next_ma, now);
+                        damping = (damping * 0.2).max(1e-9);
+                        break;
+                    }
+                    _ => damping *= 8.0,
+                }
+            }
+            if before - least < SETTLED {
+                break;
+            }
+        }
+        Some((ar, ma))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+
+    fn drawn(ar: &[f64], ma: &[f64], samples: usize, seed: u64) -> Vec<f64> {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let lead = 20_000;
+        let e: Vec<f64> = (0..samples + lead)
+            .map(|_| random.sample(StandardNormal))
+            .collect();
+        let mut v: Vec<f64> = Vec::with_capacity(e.len());
+        for k in 0..e.len() {
+            let mut now = e[k];
+            for (i, c) in ma.iter().enumerate().take(k) {
+                now += c * e[k - 1 - i];
+            }
+            for (i, a) in ar.iter().enumerate().take(k) {
+                now -= a * v[k - 1 - i];
+            }
+            v.push(now);
+        }
+        v.split_off(lead)
+    }
+
+    fn chosen(v: Vec<f64>) -> Colour {
+        let mask = vec![vec![true; v.len()]];
+        colour(&vec![v], 1, 0, &mask, Colours::All)
+    }
+
+    /// Slow and white noise: of order (1, 1), with the likelihood of the truth but for chance.
+    #[test]
+    fn slow_and_white_noise_is_of_order_one() {
+        let mut right = 0;
+        for seed in 0..20 {
+            let v = drawn(&[-0.98], &[-0.8], 3000, seed);
+            let mask = vec![true; v.len()];
+            let found = chosen(v.clone());
+            right += usize::from((found.ar.len(), found.ma.len()) == (1, 1));
+            let stretch = [(v.as_slice(), mask.as_slice())];
+            let truth = Colour::new(vec![-0.98], vec![-0.8]).unwrap();
+            let worse = deviance(&found, &stretch, 0.0) - deviance(&truth, &stretch, 0.0);
+            assert!(worse < 4.0, "{seed}: {worse} {found:?}");
+        }
+        assert!(right >= 18, "{right} of 20");
+    }
+
+    #[test]
+    fn mixed_models_reach_the_likelihood_of_the_truth() {
+        let models: [(&[f64], &[f64]); 4] = [
+            (&[-1.6, 0.64], &[-0.3]),
+            (&[-1.7, 0.8], &[-0.4, 0.2]),
+            (&[-0.999], &[-0.9]),
+            (&[-1.95, 0.955], &[-1.2, 0.3]),
+        ];
+        for (ar, ma) in models {
+            for seed in 0..5 {
+                let v = drawn(ar, ma, 3000, 50 + seed);
+                let mask = vec![true; v.len()];
+                let found = chosen(v.clone());
+                let stretch = [(v.as_slice(), mask.as_slice())];
+                let truth = Colour::new(ar.to_vec(), ma.to_vec()).unwrap();
+                let worse = deviance(&found, &stretch, 0.0) - deviance(&truth, &stretch, 0.0);
+                // A model with fewer coefficients may be chosen: by Schwarz each is worth ln(3000) = 8.
+                assert!(worse < 10.0, "{ar:?} {ma:?} {seed}: {worse} {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn white_noise_stays_white() {
+        let coloured = (0..40)
+            .filter(|seed| chosen(drawn(&[], &[], 3000, *seed)).len() > 0)
+            .count();
+        assert!(coloured <= 3, "{coloured} of 40");
+    }
+
+    /// Short gaps cost little; what stands in them does not matter.
+    #[test]
+    fn gaps_do_not_change_the_colour() {
+        let mut v = drawn(&[-0.98], &[-0.8], 3000, 3);
+        let whole = chosen(v.clone());
+        let mut mask = vec![true; v.len()];
+        for k in (40..2900).step_by(150) {
+            for i in 0..3 {
+                mask[k + i] = false;
+                v[k + i] = 1e6;
+            }
+        }
+        let found = colour(&vec![v], 1, 0, &vec![mask], Colours::All);
+        assert_eq!((found.ar.len(), found.ma.len()), (1, 1));
+        assert!(
+            (found.ar[0] - whole.ar[0]).abs() < 0.01,
+            "{found:?} {whole:?}"
+        );
+        assert!(
+            (found.ma[0] - whole.ma[0]).abs() < 0.04,
+            "{found:?} {whole:?}"
+        );
+    }
+}
