@@ -480,6 +480,7 @@ fn finding(
         augmented: found.then(|| model.clone()),
         gain,
         rivals,
+        troubles: Vec::new(),
         freezes: Vec::new(),
         coarse: None,
         adequacy,

@@ -1,0 +1,1 @@
+//! Troubles put into recordings of several plants, and ordinary recordings in which there are none.
