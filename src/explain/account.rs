@@ -176,7 +176,11 @@ impl Answer<'_> {
             found.sentence.clone_from(&trouble.sentence);
             Some(found)
         };
-        self.finding.troubles.iter().filter_map(of_trouble).collect()
+        self.finding
+            .troubles
+            .iter()
+            .filter_map(of_trouble)
+            .collect()
     }
 
     fn exact(&self, id: &str, output: usize, numbers: &[(&str, f64, &str)]) -> Option<EffectFound> {

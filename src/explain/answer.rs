@@ -170,7 +170,12 @@ impl Answer<'_> {
             .collect();
         said.splice(0..0, new);
         if explanation.verdict == Verdict::Parameters {
-            said.extend(same_factor(&explanation.parameters));
+            let free = &self.finding.boring.full;
+            said.extend(same_factor(
+                &self.known.structure.coordinates.given,
+                &free.structure.plant(&free.theta),
+                self.data().signals(),
+            ));
         }
     }
 

@@ -63,7 +63,14 @@ pub fn explain(
                 .is_none_or(|a| a.p_value > LEVEL || a.share < MOSTLY_NOISE)
     });
     let ordinary = (!settled)
-        .then(|| inquire(&known.data, &known.structure, checked.mask(&known.data), &allowed))
+        .then(|| {
+            inquire(
+                &known.data,
+                &known.structure,
+                checked.mask(&known.data),
+                &allowed,
+            )
+        })
         .flatten();
     let (known, mut finding, mask) = match (drive, ordinary) {
         (Some((drive, averaged, counted)), Some((finding, mask)))

@@ -369,11 +369,7 @@ fn check_outputs(recordings: &[Log], logs: &[Log]) -> Result<(), ExplainError> {
     Ok(())
 }
 
-fn of_outputs(
-    recordings: &[Log],
-    logs: &[Log],
-    interpolated: bool,
-) -> Result<Known, ExplainError> {
+fn of_outputs(recordings: &[Log], logs: &[Log], interpolated: bool) -> Result<Known, ExplainError> {
     let delays = vec![0; recordings[0].inputs.len()];
     let data = data_of(recordings, &delays);
     let mut noise_free = data.clone();

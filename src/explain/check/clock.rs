@@ -1,6 +1,5 @@
 //! Clocks that run at different rates: a lag between recording and simulation that grows in proportion to time.
 
-use crate::explain::explanation::ParameterChange;
 use crate::log::Log;
 
 /// Rates that are looked for, on either side of equal clocks.
@@ -268,37 +267,43 @@ pub(crate) fn recording_corrected(
     (cut, simulated)
 }
 
-/// A common factor of rates further from one than this is no clock's.
-const MOST_CLOCK: f64 = 0.05;
-/// Rates that agree to this share of the change, and gains and dampings that change by less than this share of
-/// themselves, are those of a clock.
-const SAME: f64 = 0.2;
-const UNCHANGED: f64 = 0.01;
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// What is said where all rates differ by one small factor and nothing else does: a time base would do that.
-pub(crate) fn same_factor(parameters: &[ParameterChange]) -> Option<String> {
-    let mut rates = Vec::new();
-    for p in parameters {
-        let ratio = p.recording / p.simulation;
-        if p.name.contains("natural frequency") {
-            rates.push(ratio);
-        } else if p.name.contains("time constant") {
-            rates.push(1.0 / ratio);
-        } else if (ratio - 1.0).abs() > UNCHANGED && !p.name.contains("delay") {
-            return None;
+    fn signal(t: f64) -> f64 {
+        (0.11 * t).sin() + 0.6 * (0.237 * t + 1.0).sin() + 0.3 * (0.041 * t).cos()
+    }
+
+    #[test]
+    fn the_rate_of_a_clock_is_found() {
+        for rate in [0.01, -0.01, 0.003, -0.02] {
+            let y: Vec<f64> = (0..2000)
+                .map(|k| 1.03 * signal(f64::from(k)) + 0.1 * (2.1 * f64::from(k)).sin())
+                .collect();
+            let s: Vec<f64> = (0..2000)
+                .map(|k| signal(f64::from(k) * (1.0 - rate)))
+                .collect();
+            let found = drift(&[(&y, &s)]).expect("a drift");
+            let expected = 1.0 / (1.0 - rate) - 1.0;
+            assert!(
+                (found.rate - expected).abs() < 2e-5,
+                "{} {expected}",
+                found.rate
+            );
+            let back = found.back();
+            assert!((back.at(found.at(700.0)) - 700.0).abs() < 1e-9);
         }
     }
-    let mean = rates.iter().sum::<f64>() / rates.len().max(1) as f64;
-    let change = mean - 1.0;
-    let alike = rates
-        .iter()
-        .all(|r| (r - mean).abs() < SAME * change.abs());
-    (alike && !rates.is_empty() && change.is_finite() && change != 0.0 && change.abs() < MOST_CLOCK)
-        .then(|| {
-            format!(
-                "Everything in the recording is {:.2} % {} than in the simulation and nothing else differs: a clock (time base, sample time) that is wrong by as much would look the same.",
-                100.0 * change.abs(),
-                if change > 0.0 { "faster" } else { "slower" }
-            )
-        })
+
+    #[test]
+    fn a_constant_lag_is_no_drift() {
+        for lag in [0.0, 1.0, 7.0, -20.0] {
+            let y: Vec<f64> = (0..2000)
+                .map(|k| 0.8 * signal(f64::from(k) - lag))
+                .collect();
+            let s: Vec<f64> = (0..2000).map(|k| signal(f64::from(k))).collect();
+            assert_eq!(drift(&[(&y, &s)]), None);
+        }
+    }
 }

@@ -10,7 +10,7 @@
 //! | `gross` | dropouts to one value, isolated outliers |
 //! | `wrap` | an angle that starts again each turn |
 //! | `relation` | exchanged outputs, another sign, another unit |
-//! | `clock` | clocks of different rates |
+//! | `clock`, `rates` | clocks of different rates, and other parameters that a clock would make |
 //! | `frozen`, `lattice` | a sensor that holds its value, a coarse one |
 //! | `words` | what is said of it |
 
@@ -19,16 +19,17 @@ mod finding;
 mod frozen;
 mod gross;
 mod lattice;
+mod rates;
 mod relation;
 #[cfg(test)]
 mod tests;
 mod words;
 mod wrap;
 
-pub(crate) use clock::same_factor;
 pub(crate) use finding::Trouble;
 pub(crate) use frozen::{Freeze, frozen};
 pub(crate) use lattice::coarse_sensor;
+pub(crate) use rates::same_factor;
 pub(crate) use relation::between;
 
 use super::baseline::identify_simulator;
@@ -137,24 +138,21 @@ impl Checked {
         mask
     }
 
-    fn of_columns(
-        &mut self,
-        simulated: &mut Vec<Vec<Vec<f64>>>,
-        allowed: &dyn Fn(&str) -> bool,
-    ) {
+    fn of_columns(&mut self, simulated: &mut Vec<Vec<Vec<f64>>>, allowed: &dyn Fn(&str) -> bool) {
         self.copies(simulated);
         if !self.troubles.is_empty() {
             return;
         }
+        if allowed("sensor_wrap") {
+            self.wraps(simulated);
+        }
         let raw = self.recordings.clone();
         // Relations are looked for beside what stands out; that is looked for again beside the simulation as corrected.
+        let wraps = std::mem::take(&mut self.troubles);
         self.leave_out(simulated, allowed);
         let provisional = std::mem::take(&mut self.troubles);
         if allowed("swapped_outputs") {
             self.exchanged(simulated);
-        }
-        if allowed("sensor_wrap") {
-            self.wraps(simulated);
         }
         self.relations(simulated);
         if allowed("clock_drift") {
@@ -177,18 +175,16 @@ impl Checked {
             }
             self.leave_out(simulated, allowed);
         }
+        self.troubles.splice(0..0, wraps);
     }
 
     /// Columns that are copies of others.
     fn copies(&mut self, simulated: &[Vec<Vec<f64>>]) {
         for (r, (log, simulated)) in self.recordings.iter().zip(simulated).enumerate() {
             for (o, y) in log.output_data.iter().enumerate() {
-                let other = simulated
-                    .iter()
-                    .position(|s| is_copy(y, s))
-                    .map(|of| words::Copy::Simulated(of));
+                let other = simulated.iter().position(|s| is_copy(y, s));
                 if let Some(of) = other {
-                    self.troubles.push(words::identical(log, r, o, &of));
+                    self.troubles.push(words::identical(log, r, o, of));
                 }
             }
         }
@@ -207,7 +203,8 @@ impl Checked {
             for s in simulated.iter_mut() {
                 s.swap(i, j);
             }
-            self.troubles.push(words::swapped(&self.recordings[0], i, j));
+            self.troubles
+                .push(words::swapped(&self.recordings[0], i, j));
         }
     }
 
@@ -351,7 +348,8 @@ fn never_rests(log: &Log) -> bool {
     let n = log.samples();
     log.input_data.iter().any(|u| {
         let whole = super::data::deviation(u.iter());
-        u.chunks(n.div_ceil(8).max(1))
-            .all(|part| super::data::deviation(part.iter()) > 0.3 * whole && part.iter().any(|v| *v != part[0]))
+        u.chunks(n.div_ceil(8).max(1)).all(|part| {
+            super::data::deviation(part.iter()) > 0.3 * whole && part.iter().any(|v| *v != part[0])
+        })
     })
 }

@@ -4,13 +4,19 @@
 const MUCH_BETTER: f64 = 0.25;
 /// And no more than this share of the output.
 const MOSTLY: f64 = 0.5;
-/// A factor is looked for where it explains this share of the recording.
+/// A sign, or a factor that no other physics makes, is looked for where it explains this share of the recording ...
 const FOLLOWS: f64 = 0.8;
+/// ... and one that a lost gain could be, where it explains nearly all.
+const NEARLY_ALL: f64 = 0.97;
+/// Factors from this on (or below its inverse) are no gain that physics loses.
+const ONLY_UNITS: f64 = 20.0;
 /// A factor is in the list within three of its standard errors, no closer than this (gains of sensors have some tenths
 /// of a percent) ...
 const CLOSE: f64 = 0.005;
 /// ... and not further off.
 const FAR: f64 = 0.02;
+/// Signals of below average size have the same gain to this share.
+const UNIFORM: f64 = 0.03;
 /// Blocks over which the error of a factor is estimated.
 const BLOCKS: usize = 20;
 /// An offset below this share of the recording's standard deviation is none of units.
@@ -55,14 +61,9 @@ const CONVERSIONS: &[Conversion] = &[
     of(25.4, "mm per inch"),
     of(2.54, "cm per inch"),
     of(3.280_839_895, "ft per m"),
-    of(1.609_344, "km per mile"),
     of(2.236_936_292, "mph per m/s"),
-    of(1.943_844_492, "knots per m/s"),
     of(9.806_65, "N per kgf, or m/s2 per g"),
     of(4.448_221_615, "N per lbf"),
-    of(2.204_622_622, "lb per kg"),
-    of(4.1868, "J per cal"),
-    of(3.785_411_784, "l per gallon"),
     Conversion {
         factor: 1.8,
         offset: 32.0,
@@ -155,6 +156,7 @@ pub(crate) fn relation(pairs: &Pairs) -> Option<Relation> {
     let close = (3.0 * std).clamp(CLOSE, FAR);
     let deviation = (yy / n).sqrt();
     let reversed = gain < 0.0;
+    let explained = sy * sy / (ss * yy);
     let candidates = CONVERSIONS.iter().flat_map(|c| {
         let forth = (c.factor, c.offset, c.words.to_owned());
         let back = (
@@ -175,14 +177,21 @@ pub(crate) fn relation(pairs: &Pairs) -> Option<Relation> {
         let shifted = (expected - shift).abs() < NO_OFFSET.min(1.0) * deviation.min(shift.abs());
         let plain = expected.abs() < NO_OFFSET * deviation;
         let agrees = if *shift == 0.0 { plain } else { shifted };
-        off < close && (agrees || (plain && (factor - 1.0).abs() > 0.1))
+        let could_be_physics =
+            (1.0 / ONLY_UNITS..ONLY_UNITS).contains(factor) && explained < NEARLY_ALL;
+        off < close && !could_be_physics && (agrees || (plain && (factor - 1.0).abs() > 0.1))
     };
-    let unit = candidates
-        .filter(fits)
-        .min_by(|a, b| {
-            let off = |f: f64| (gain.abs() / f).ln().abs();
-            off(a.0).total_cmp(&off(b.0))
-        });
+    // Dead zones and limits lose more of small or of large signals: a unit does not.
+    let size = (ss / n).sqrt();
+    let (small_ss, small_sy) = all()
+        .map(|(y, s)| (y - mean_y, s - mean_s))
+        .filter(|(_, s)| s.abs() < size)
+        .fold((0.0, 0.0), |(ss, sy), (y, s)| (ss + s * s, sy + s * y));
+    let uniform = (small_sy / small_ss / gain - 1.0).abs() < UNIFORM + 10.0 * std;
+    let unit = candidates.filter(|_| uniform).filter(fits).min_by(|a, b| {
+        let off = |f: f64| (gain.abs() / f).ln().abs();
+        off(a.0).total_cmp(&off(b.0))
+    });
     if unit.is_none() && !reversed {
         return None;
     }
@@ -223,8 +232,23 @@ pub(crate) fn between(recorded: &str, simulated: &str) -> Option<f64> {
             ("1/min", 0.104_719_755_119_659_77),
             ("Hz", std::f64::consts::TAU),
         ],
-        &[("m/s", 1.0), ("km/h", 1.0 / 3.6), ("mm/s", 1e-3), ("mph", 0.447_04), ("kn", 0.514_444)],
-        &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("µm", 1e-6), ("km", 1e3), ("in", 0.0254), ("ft", 0.3048)],
+        &[
+            ("m/s", 1.0),
+            ("km/h", 1.0 / 3.6),
+            ("mm/s", 1e-3),
+            ("mph", 0.447_04),
+            ("kn", 0.514_444),
+        ],
+        &[
+            ("m", 1.0),
+            ("mm", 1e-3),
+            ("cm", 1e-2),
+            ("um", 1e-6),
+            ("µm", 1e-6),
+            ("km", 1e3),
+            ("in", 0.0254),
+            ("ft", 0.3048),
+        ],
         &[
             ("Pa", 1.0),
             ("kPa", 1e3),
@@ -234,11 +258,22 @@ pub(crate) fn between(recorded: &str, simulated: &str) -> Option<f64> {
             ("mbar", 1e2),
             ("psi", 6894.757_293),
         ],
-        &[("m3/h", 1.0 / 3600.0), ("l/s", 1e-3), ("l/min", 1e-3 / 60.0), ("m3/s", 1.0)],
+        &[
+            ("m3/h", 1.0 / 3600.0),
+            ("l/s", 1e-3),
+            ("l/min", 1e-3 / 60.0),
+            ("m3/s", 1.0),
+        ],
         &[("V", 1.0), ("mV", 1e-3), ("kV", 1e3)],
         &[("A", 1.0), ("mA", 1e-3), ("kA", 1e3)],
         &[("W", 1.0), ("kW", 1e3), ("mW", 1e-3), ("MW", 1e6)],
-        &[("N", 1.0), ("kN", 1e3), ("mN", 1e-3), ("lbf", 4.448_221_615), ("kgf", 9.806_65)],
+        &[
+            ("N", 1.0),
+            ("kN", 1e3),
+            ("mN", 1e-3),
+            ("lbf", 4.448_221_615),
+            ("kgf", 9.806_65),
+        ],
         &[("Nm", 1.0), ("N m", 1.0), ("kNm", 1e3), ("mNm", 1e-3)],
         &[("s", 1.0), ("ms", 1e-3), ("min", 60.0), ("h", 3600.0)],
         &[("kg", 1.0), ("g", 1e-3), ("t", 1e3), ("lb", 0.453_592_37)],
@@ -249,4 +284,66 @@ pub(crate) fn between(recorded: &str, simulated: &str) -> Option<f64> {
         let size = |name: &str| group.iter().find(|u| u.0 == name).map(|u| u.1);
         Some(size(simulated)? / size(recorded)?)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn signal(k: usize) -> f64 {
+        let t = k as f64;
+        (0.031 * t).sin() + 0.6 * (0.0713 * t + 1.0).sin()
+    }
+
+    fn related(of: impl Fn(usize) -> f64) -> Option<Relation> {
+        let y: Vec<f64> = (0..1500).map(&of).collect();
+        let s: Vec<f64> = (0..1500).map(signal).collect();
+        relation(&vec![(&y, &s)])
+    }
+
+    #[test]
+    fn signs_and_units_are_found() {
+        let noise = |k: usize| 0.05 * (1.7 * k as f64).sin();
+        for (factor, words) in [
+            (57.295_78, "deg per rad"),
+            (9.5493, "rpm"),
+            (3.6, "km/h"),
+            (1000.0, "thousand"),
+            (0.01, "hundred"),
+            (6.894_76, "psi"),
+        ] {
+            let found = related(|k| factor * (signal(k) + noise(k))).unwrap();
+            assert!((found.factor / factor - 1.0).abs() < 1e-4 && !found.reversed);
+            assert!(found.unit.unwrap().contains(words), "{factor}");
+        }
+        let found = related(|k| noise(k) - signal(k)).unwrap();
+        assert!(found.reversed && found.unit.is_none() && found.factor == -1.0);
+        let found = related(|k| 1.8 * signal(k) + 32.0 + noise(k)).unwrap();
+        assert!((found.factor, found.offset) == (1.8, 32.0), "{found:?}");
+    }
+
+    #[test]
+    fn other_gains_and_other_physics_are_no_units() {
+        for gain in [0.9, 1.0, 1.07, 1.3, 2.0, 5.0] {
+            assert_eq!(related(|k| gain * signal(k)), None, "{gain}");
+        }
+        // A dead zone that leaves the gain of mph per m/s.
+        assert_eq!(
+            related(|k| signal(k).signum() * (signal(k).abs() - 0.6).max(0.0)),
+            None
+        );
+    }
+
+    #[test]
+    fn exchanged_outputs_are_found() {
+        let a: Vec<f64> = (0..1500).map(signal).collect();
+        let b: Vec<f64> = (0..1500).map(|k| 0.7 * signal(3 * k + 50)).collect();
+        let (ya, yb): (Vec<f64>, Vec<f64>) = (
+            b.iter().map(|v| 1.05 * v).collect(),
+            a.iter().map(|v| 0.98 * v).collect(),
+        );
+        let (y, s) = ([&ya, &yb], [&a, &b]);
+        assert_eq!(exchanged(2, |i, j| vec![(y[i], s[j])]), Some((0, 1)));
+        assert_eq!(exchanged(2, |i, j| vec![(s[i], s[j])]), None);
+    }
 }

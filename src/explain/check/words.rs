@@ -10,12 +10,6 @@ use super::wrap::Wrap;
 use crate::explain::words::number;
 use crate::log::Log;
 
-/// What a column repeats.
-pub(super) enum Copy {
-    /// A simulated output.
-    Simulated(usize),
-}
-
 fn unit_of(log: &Log, output: usize) -> &str {
     log.outputs[output].unit.as_deref().unwrap_or("")
 }
@@ -41,13 +35,12 @@ fn trouble(kind: Kind, recording: usize, output: usize, sentence: String) -> Tro
     }
 }
 
-pub(super) fn identical(log: &Log, recording: usize, output: usize, of: &Copy) -> Trouble {
+pub(super) fn identical(log: &Log, recording: usize, output: usize, simulated: usize) -> Trouble {
     let name = &log.outputs[output].name;
-    let Copy::Simulated(simulated) = of;
-    let what = if *simulated == output {
+    let what = if simulated == output {
         format!("the simulated {name}")
     } else {
-        format!("the simulated {}", log.outputs[*simulated].name)
+        format!("the simulated {}", log.outputs[simulated].name)
     };
     trouble(
         Kind::Identical,
@@ -86,7 +79,11 @@ pub(super) fn wrapped(
         (a, _) => (format!("{name}, recorded and simulated,"), a.as_ref()),
     };
     let (period, count, first) = wrap.map_or((0.0, 0, 0), |w| {
-        (w.period, w.jumps.len(), w.jumps.first().copied().unwrap_or(0))
+        (
+            w.period,
+            w.jumps.len(),
+            w.jumps.first().copied().unwrap_or(0),
+        )
     });
     let mut found = trouble(
         Kind::Wrap,
@@ -120,7 +117,10 @@ pub(super) fn related(log: &Log, output: usize, relation: &Relation) -> Vec<Trou
                 if relation.offset == 0.0 {
                     String::new()
                 } else {
-                    format!(", shifted by {}", with_unit(relation.offset, unit_of(log, output)))
+                    format!(
+                        ", shifted by {}",
+                        with_unit(relation.offset, unit_of(log, output))
+                    )
                 }
             ),
         );
@@ -170,7 +170,11 @@ pub(super) fn drifts(log: &Log, recording: usize, drift: Drift, of_recording: bo
             "The clock (time base) of {who} is {:.3} % {}: it {} {other} by {} s over the {} s of the recording. The time base is corrected in everything that follows.",
             100.0 * rate.abs(),
             if slow { "slow" } else { "fast" },
-            if slow { "falls behind" } else { "runs ahead of" },
+            if slow {
+                "falls behind"
+            } else {
+                "runs ahead of"
+            },
             number(lag),
             number(length)
         ),
@@ -196,7 +200,10 @@ pub(super) fn gross(
     let mut list = Vec::new();
     if let Some((value, runs)) = &gross.dropouts {
         let lengths = runs.iter().map(ExactSizeIterator::len);
-        let (least, most) = (lengths.clone().min().unwrap_or(0), lengths.max().unwrap_or(0));
+        let (least, most) = (
+            lengths.clone().min().unwrap_or(0),
+            lengths.max().unwrap_or(0),
+        );
         let lengths = if least == most {
             format!("runs of {most}")
         } else {
@@ -230,7 +237,11 @@ pub(super) fn gross(
             .map(|r| log.output_data[output][r.start] - filled[r.start])
             .max_by(|a, b| a.abs().total_cmp(&b.abs()))
             .unwrap_or(0.0);
-        let noun = if runs.len() == 1 { "sample is an isolated outlier" } else { "samples are isolated outliers" };
+        let noun = if runs.len() == 1 {
+            "sample is an isolated outlier"
+        } else {
+            "samples are isolated outliers"
+        };
         let mut found = trouble(
             Kind::Outliers,
             recording,
