@@ -21,8 +21,6 @@ mod gross;
 mod lattice;
 mod rates;
 mod relation;
-#[cfg(test)]
-mod tests;
 mod words;
 mod wrap;
 

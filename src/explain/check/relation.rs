@@ -59,11 +59,7 @@ const CONVERSIONS: &[Conversion] = &[
     of(133.322, "Pa per mmHg"),
     of(16.666_666_667, "l/min per m3/h"),
     of(25.4, "mm per inch"),
-    of(2.54, "cm per inch"),
-    of(3.280_839_895, "ft per m"),
-    of(2.236_936_292, "mph per m/s"),
     of(9.806_65, "N per kgf, or m/s2 per g"),
-    of(4.448_221_615, "N per lbf"),
     Conversion {
         factor: 1.8,
         offset: 32.0,
@@ -179,7 +175,7 @@ pub(crate) fn relation(pairs: &Pairs) -> Option<Relation> {
         let agrees = if *shift == 0.0 { plain } else { shifted };
         let could_be_physics =
             (1.0 / ONLY_UNITS..ONLY_UNITS).contains(factor) && explained < NEARLY_ALL;
-        off < close && !could_be_physics && (agrees || (plain && (factor - 1.0).abs() > 0.1))
+        off < close && !could_be_physics && (agrees || (plain && *factor > 1.1))
     };
     // Dead zones and limits lose more of small or of large signals: a unit does not.
     let size = (ss / n).sqrt();

@@ -1,1 +1,0 @@
-//! Troubles put into recordings of several plants, and ordinary recordings in which there are none.
