@@ -24,6 +24,7 @@ Effects (for --without):
   coulomb_friction stribeck_friction quadratic_drag cubic_stiffness quadratic_stiffness end_stop hysteresis
   position_dependent_gain input_saturation input_dead_zone input_backlash input_rate_limit input_asymmetry input_delay
   actuator_lag sensor_saturation sensor_offset sensor_drift sensor_rectification sensor_quantization sensor_freeze
+  sensor_dropout sensor_outliers sensor_wrap swapped_outputs clock_drift
   periodic_disturbance load_step extra_mode missing_input gain_change stiffness_change tank_outflow overflow;
   of drives also cogging direction_dependent_friction
 

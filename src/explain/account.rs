@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::answer::Answer;
+use super::check::Trouble;
 use super::effects::{self, Action, Port};
 use super::explanation::{
     Alternative, Detectable, EFFECTS_TIE, EffectFound, Evidence, Quantity, Verdict,
@@ -160,6 +161,25 @@ impl Answer<'_> {
             }
         }
         self.outputs()[most.1].name.clone()
+    }
+
+    /// What was wrong with the data, where that is an answer of its own.
+    pub(crate) fn troubles(&self) -> Vec<EffectFound> {
+        let of_trouble = |trouble: &Trouble| {
+            let numbers: Vec<(&str, f64, &str)> = trouble
+                .numbers
+                .iter()
+                .map(|n| (n.name, n.value, n.unit.as_str()))
+                .collect();
+            let mut found = self.exact(trouble.kind.id()?, trouble.output, &numbers)?;
+            found.sentence.clone_from(&trouble.sentence);
+            Some(found)
+        };
+        self.finding
+            .troubles
+            .iter()
+            .filter_map(of_trouble)
+            .collect()
     }
 
     fn exact(&self, id: &str, output: usize, numbers: &[(&str, f64, &str)]) -> Option<EffectFound> {

@@ -1,6 +1,7 @@
 //! From what was found to what is said.
 
 use super::adequacy::adequacy;
+use super::check::same_factor;
 use super::curve;
 use super::data::{Data, Series};
 use super::effects::Port;
@@ -73,6 +74,7 @@ impl Answer<'_> {
         if let Some(first) = effects.first_mut() {
             first.evidence.heldout_gain = heldout_gain;
         }
+        effects.extend(self.troubles());
         let verdict = finding.verdict;
         let location = self.location(
             &squares,
@@ -156,7 +158,29 @@ impl Answer<'_> {
         ) {
             explanation.summary.insert(1, mechanics.sentence.clone());
         }
+        self.say_of_the_data(&mut explanation);
         explanation
+    }
+
+    /// What is wrong with the data comes first, whatever the answer is.
+    fn say_of_the_data(&self, explanation: &mut Explanation) {
+        let said = &mut explanation.summary;
+        let new: Vec<String> = self
+            .finding
+            .troubles
+            .iter()
+            .map(|t| t.sentence.clone())
+            .filter(|s| !said.contains(s))
+            .collect();
+        said.splice(0..0, new);
+        if explanation.verdict == Verdict::Parameters {
+            let free = &self.finding.boring.full;
+            said.extend(same_factor(
+                &self.known.structure.coordinates.given,
+                &free.structure.plant(&free.theta),
+                self.data().signals(),
+            ));
+        }
     }
 
     /// The output whose error falls most, relative to its noise.

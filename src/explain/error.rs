@@ -63,13 +63,14 @@ pub enum ExplainError {
     },
     /// Units differ.
     #[error(
-        "{simulation}: {channel} is in {simulated}, and the recording's is in {recorded}; convert one of them, or take the unit out of its header"
+        "{simulation}: the units of {channel} contradict each other: it is in {simulated}, and the recording's is in {recorded}{factor}; convert one of them, or take the unit out of its header"
     )]
     Unit {
         simulation: String,
         channel: String,
         recorded: String,
         simulated: String,
+        factor: String,
     },
     /// Numbers whose squares and products are none.
     #[error(

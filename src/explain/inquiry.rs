@@ -1,9 +1,9 @@
 //! Decides: consistent, parameters, named, family or unexplained.
 
 use super::adequacy::{Adequacy, adequacy};
+use super::check::{Freeze, Trouble, coarse_sensor, frozen};
 use super::data::{Data, difference};
 use super::effects::{self, Definition, Unit};
-use super::exact::{Freeze, frozen};
 use super::explanation::Verdict;
 use super::fit::{Effort, Fit, Problem};
 use super::noise::Mask;
@@ -13,7 +13,6 @@ use super::search::{Boring, Ranked, single_effects};
 use super::second::{self, pair, validated_gain, with_feedthrough};
 use super::simulation::Known;
 use super::structure::Structure;
-use crate::log::spacing;
 
 /// Places, laws and starting values that are tried on one recording, about: a name among so many needs
 /// `2 ln(300)` more than nothing at all (the maximum of that many chi-squares with one degree of freedom).
@@ -33,9 +32,6 @@ const BEYOND_DOUBT: f64 = 100.0;
 const NOTHING_LEFT: f64 = 0.02;
 /// A textbook law is rarely closer to the real one than some percents of what it explains.
 const LAW_IMPERFECTION: f64 = 0.02;
-/// Share of the innovation variance that rounding to levels must make up to be named.
-const COARSE: f64 = 0.25;
-
 /// Share from which nothing else is looked for: rounding would be taken for anything.
 const MOSTLY_COARSE: f64 = 0.3;
 
@@ -60,6 +56,8 @@ pub(crate) struct Finding {
     pub gain: f64,
     /// Others, best first.
     pub rivals: Vec<Rival>,
+    /// What was wrong with the data before anything was looked for in them.
+    pub troubles: Vec<Trouble>,
     pub freezes: Vec<Freeze>,
     /// Output and step of a coarse sensor.
     pub coarse: Option<(usize, f64)>,
@@ -74,6 +72,20 @@ pub(crate) struct Finding {
 }
 
 impl Finding {
+    /// Adds what was wrong with the data: where nothing else is missing, it is the answer.
+    pub fn add(&mut self, troubles: Vec<Trouble>) {
+        if troubles.iter().any(|t| t.kind.id().is_some())
+            && matches!(self.verdict, Verdict::Consistent | Verdict::Parameters)
+        {
+            self.verdict = Verdict::Named;
+        } else if troubles.iter().any(|t| t.kind.is_relation())
+            && self.verdict == Verdict::Consistent
+        {
+            self.verdict = Verdict::Parameters;
+        }
+        self.troubles = troubles;
+    }
+
     /// Root mean square free-run error of each half of `data` when the numbers of the model that stands are fitted to the
     /// other, over the standard deviation of what was recorded, where `mask` counts; `None` where a half does not determine
     /// them. Of drives: one output.
@@ -92,15 +104,16 @@ impl Finding {
     }
 }
 
-/// Runs the whole inquiry. `structure` is the simulation as it is known.
+/// Runs the whole inquiry. `structure` is the simulation as it is known, `mask` the samples that count.
 pub(crate) fn inquire(
     known: &Known,
+    mask: Mask,
     allowed: &(dyn Fn(&Definition) -> bool + Sync),
 ) -> Option<(Finding, Mask)> {
     let (data, structure) = (&known.data, &known.structure);
     let mut problem = Problem::new(data);
-    let heldout;
-    (problem.mask, heldout) = super::prove::set_aside(data, &problem.mask);
+    let mut heldout;
+    (problem.mask, heldout) = super::prove::set_aside(data, &mask);
     let said = structure.simulate(&structure.given(), data)?;
     let freezes = if allowed(effects::find("sensor_freeze", "")?) {
         frozen(data, &said)
@@ -110,6 +123,8 @@ pub(crate) fn inquire(
     for freeze in &freezes {
         let mask = &mut problem.mask[freeze.segment * data.outputs + freeze.output];
         mask[freeze.from + 1..freeze.to].fill(false);
+        heldout[freeze.segment * data.outputs + freeze.output][freeze.from + 1..freeze.to]
+            .fill(false);
     }
     let count = problem.count();
     let refit = known
@@ -123,7 +138,7 @@ pub(crate) fn inquire(
     }
     let base = boring.best(count).criterion(count);
     let coarse = if allowed(effects::find("sensor_quantization", "")?) {
-        coarse_sensor(&problem, boring.best(count))
+        coarse_sensor(data, &boring.best(count).residual, &problem.mask)
     } else {
         None
     };
@@ -134,6 +149,7 @@ pub(crate) fn inquire(
         augmented: None,
         gain: 0.0,
         rivals: Vec::new(),
+        troubles: Vec::new(),
         freezes,
         coarse: coarse.map(|(output, step, _)| (output, step)),
         adequacy: None,
@@ -311,27 +327,6 @@ fn least_heldout(expected: f64) -> f64 {
     (expected - 1.645 * 2.0 * expected.max(0.0).sqrt()).max(0.0)
 }
 
-/// An output on a lattice so coarse that rounding is a good part of the residual: `(output, step, share)`.
-fn coarse_sensor(problem: &Problem, fit: &Fit) -> Option<(usize, f64, f64)> {
-    problem
-        .data
-        .outputs_as_series()
-        .enumerate()
-        .filter_map(|(series, y)| {
-            let step = spacing(y)?;
-            let counted = fit.residual[series]
-                .iter()
-                .zip(&problem.mask[series])
-                .filter_map(|(e, keep)| keep.then_some(e * e));
-            let (sum, n) = counted.fold((0.0, 0usize), |(sum, n), e| (sum + e, n + 1));
-            let variance = sum / n.max(1) as f64;
-            // Variance of rounding: step^2/12.
-            let share = step * step / 12.0 / variance.max(1e-300);
-            (share > COARSE).then_some((series % problem.data.outputs, step, share))
-        })
-        .max_by(|a, b| a.2.total_cmp(&b.2))
-}
-
 /// What some effects owe beyond the count of their parameters.
 pub(crate) fn penalty(ranked: &Ranked, base: f64, count: usize) -> f64 {
     let structure = &ranked.fit.structure;
@@ -419,38 +414,4 @@ pub(crate) fn polished(problem: &Problem, fit: &Fit) -> Fit {
     fit.improved(problem, Effort::FINAL)
         .filter(|better| better.deviance < fit.deviance)
         .unwrap_or_else(|| fit.clone())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::explain::fixtures::{NOISE, recorded, spring};
-
-    #[test]
-    fn a_lattice_is_told_of_where_rounding_is_much_of_what_is_left() {
-        let structure = spring(Vec::new());
-        let clean = recorded(&structure, &[], 3);
-        for step in [0.0, 0.02, 0.2, 0.4] {
-            let mut data = clean.clone();
-            if step > 0.0 {
-                for y in &mut data.segments[0].outputs[0] {
-                    *y = (*y / step).round() * step;
-                }
-            }
-            let problem = Problem::new(&data);
-            let fit = Fit::at(&problem, structure.clone(), Vec::new()).unwrap();
-            let rounding = step * step / 12.0;
-            let expected = rounding / (rounding + NOISE * NOISE);
-            match coarse_sensor(&problem, &fit) {
-                None => assert!(expected < COARSE, "{step}"),
-                Some((output, found, share)) => {
-                    assert!(expected > COARSE && output == 0, "{step}");
-                    assert!((found / step - 1.0).abs() < 1e-6, "{found}");
-                    // A coarse lattice takes some of the noise with it.
-                    let ratio = share / expected;
-                    assert!((0.85..1.25).contains(&ratio), "{step}: {ratio}");
-                }
-            }
-        }
-    }
 }

@@ -20,7 +20,8 @@
 //! | `search`, `refine`, `plausible`, `second`, `inquiry` | the fits, what is kept of them, the decision |
 //! | `weak` | drives: the averaged equation of motion, where a free run cannot tell |
 //! | `question`, `memory` | which ways are gone and which of them speaks; what that takes of the memory |
-//! | `exact`, `adequacy` | tests without fits, and of what is left |
+//! | `check` | the data before the physics: dropouts, outliers, wraps, clocks, signs, units, exchanged outputs, a stuck sensor |
+//! | `adequacy` | tests of what is left |
 //! | `locate`, `curve`, `prove`, `probability` | where, the law without a form, held-out blocks, how sure |
 //! | `answer`, `account`, `words`, `explanation`, `augmented`, `start` | what is said, and the model that can be run |
 
@@ -31,12 +32,12 @@ mod augmented;
 mod baseline;
 mod cascade;
 mod changes;
+mod check;
 mod coordinates;
 mod curve;
 mod data;
 pub mod effects;
 mod error;
-mod exact;
 mod explanation;
 mod features;
 mod finer;

@@ -2,6 +2,7 @@
 
 use super::adequacy::LEVEL;
 use super::answer::Answer;
+use super::check::Checked;
 use super::data::Data;
 use super::effects::{self, Definition};
 use super::error::ExplainError;
@@ -44,8 +45,12 @@ pub fn explain(
         }
     }
     memory::check(recordings)?;
-    let known = know(recordings, simulation)?;
-    let allowed = |d: &Definition| !options.without.iter().any(|id| id == d.id);
+    let allowed_id = |id: &str| !options.without.iter().any(|without| without == id);
+    let allowed = |d: &Definition| allowed_id(d.id);
+    // The data before the physics: from here on they are as repaired.
+    let checked = Checked::new(recordings, simulation, &allowed_id);
+    let recordings = checked.recordings.as_slice();
+    let known = know(&checked)?;
     let drive = weak::attempt(recordings, &known, &allowed);
     // What a law in the averaged equation of a drive explains to noise needs no other way, and the rest little. Where no law
     // was found, the equation may be blind to what there is (effects of the sensor, another mode), and where a spring
@@ -57,8 +62,10 @@ pub fn explain(
                 .adequacy
                 .is_none_or(|a| a.p_value > LEVEL || a.share < MOSTLY_NOISE)
     });
-    let ordinary = (!settled).then(|| inquire(&known, &allowed)).flatten();
-    let (known, finding, mask) = match (drive, ordinary) {
+    let ordinary = (!settled)
+        .then(|| inquire(&known, checked.mask(&known.data), &allowed))
+        .flatten();
+    let (known, mut finding, mask) = match (drive, ordinary) {
         (Some((drive, averaged, counted)), Some((finding, mask)))
             if tells_more(
                 (&finding, &known.data, &mask),
@@ -75,6 +82,7 @@ pub fn explain(
             });
         }
     };
+    finding.add(checked.troubles.clone());
     Ok(Answer {
         recordings,
         known: &known,

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::baseline::{Simulator, identify_simulator};
+use super::check::{Checked, INTERPOLATION, between};
 use super::coordinates::Coordinates;
 use super::data::{Data, Segment, Series};
 use super::effects::{Action, Definition};
@@ -52,7 +53,8 @@ const LEAST_SAMPLES: usize = 150;
 const UNDERSTOOD: f64 = 0.5;
 
 /// Checks and prepares everything.
-pub(crate) fn know(recordings: &[Log], simulation: &Simulation) -> Result<Known, ExplainError> {
+pub(crate) fn know(checked: &Checked) -> Result<Known, ExplainError> {
+    let (recordings, simulation) = (checked.recordings.as_slice(), &checked.simulation);
     let first = recordings.first().ok_or(ExplainError::NoRecording)?;
     for log in recordings {
         log.check()?;
@@ -80,7 +82,7 @@ pub(crate) fn know(recordings: &[Log], simulation: &Simulation) -> Result<Known,
             logs.iter().try_for_each(Log::check)?;
             logs.iter().try_for_each(check_sizes)?;
             check_outputs(recordings, logs)?;
-            of_outputs(recordings, logs)?
+            of_outputs(recordings, logs, checked.interpolated)?
         }
     };
     let states = known.structure.states();
@@ -295,6 +297,9 @@ fn check_unit(name: &str, ours: &Channel, theirs: &Channel) -> Result<(), Explai
             channel: ours.name.clone(),
             recorded: recorded.clone(),
             simulated: simulated.clone(),
+            factor: between(recorded, simulated).map_or_else(String::new, |f| {
+                format!(" (1 {simulated} is {} {recorded})", super::words::number(f))
+            }),
         }),
         _ => Ok(()),
     }
@@ -340,7 +345,7 @@ fn check_outputs(recordings: &[Log], logs: &[Log]) -> Result<(), ExplainError> {
     Ok(())
 }
 
-fn of_outputs(recordings: &[Log], logs: &[Log]) -> Result<Known, ExplainError> {
+fn of_outputs(recordings: &[Log], logs: &[Log], interpolated: bool) -> Result<Known, ExplainError> {
     let delays = vec![0; recordings[0].inputs.len()];
     let data = data_of(recordings, &delays);
     let mut noise_free = data.clone();
@@ -353,7 +358,7 @@ fn of_outputs(recordings: &[Log], logs: &[Log]) -> Result<Known, ExplainError> {
         misfit: 1.0,
     })?;
     let structure = bare(&simulator.plant, &simulator.initial);
-    if simulator.is_linear() {
+    if simulator.is_linear() || interpolated && simulator.misfit < INTERPOLATION {
         return Ok(Known {
             data,
             structure,

@@ -475,6 +475,7 @@ fn finding(
         augmented: found.then(|| model.clone()),
         gain,
         rivals,
+        troubles: Vec::new(),
         freezes: Vec::new(),
         coarse: None,
         adequacy,

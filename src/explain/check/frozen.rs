@@ -1,6 +1,6 @@
 //! What needs no fit: a sensor that holds its value.
 
-use super::data::Data;
+use crate::explain::data::Data;
 use crate::log::spacing;
 
 /// A run of equal samples must be this improbable, over the whole recording, to be a frozen sensor.
@@ -21,7 +21,7 @@ pub(crate) struct Freeze {
 
 /// Runs of equal samples that chance does not make, away from the ends of the range (there a sensor saturates), while
 /// the simulation `moving` moves.
-pub(crate) fn frozen(data: &Data, simulated: &super::data::Series) -> Vec<Freeze> {
+pub(crate) fn frozen(data: &Data, simulated: &crate::explain::data::Series) -> Vec<Freeze> {
     let mut found = Vec::new();
     for (series, y) in data.outputs_as_series().enumerate() {
         let n = y.len();
