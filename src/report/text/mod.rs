@@ -22,8 +22,8 @@ pub use show::show_text;
 pub(crate) use table::Table;
 pub use validation_text::validation_text;
 pub(crate) use validation_text::{findings, test_tables};
-pub(crate) use verdict::doubtful;
 pub use verdict::verdict;
+pub(crate) use verdict::{doubtful, too_short};
 
 /// Widest line.
 pub const WIDTH: usize = 100;

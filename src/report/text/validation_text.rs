@@ -19,10 +19,13 @@ pub fn validation_text(tests: &Validation) -> String {
             tests.samples,
             percent(100.0 * tests.level)
         )
+    } else if let Some(short) = &tests.too_short {
+        format!("On {data}: {}", short.sentence())
     } else {
         format!(
-            "Model accepted on {data} ({} samples): nothing speaks against it",
-            tests.samples
+            "Model accepted on {data} ({} samples): {}",
+            tests.samples,
+            in_words(tests)
         )
     };
     let mut out = wrapped("", &verdict);
@@ -38,9 +41,24 @@ pub fn validation_text(tests: &Validation) -> String {
     out
 }
 
+/// What an acceptance rests on.
+pub(crate) fn in_words(tests: &Validation) -> &'static str {
+    match (&tests.whiteness, &tests.linearity) {
+        (_, Some(_)) => "nothing left to explain, the residuals are white and linear in the past",
+        (Some(_), None) => {
+            "nothing left to explain, the residuals are white; linearity was not tested"
+        }
+        (None, None) => "nothing speaks against it; linearity was not tested",
+    }
+}
+
 /// The findings but those that the tables say already: that nothing was found, why there is no free run.
 pub(crate) fn findings(tests: &Validation) -> Vec<String> {
-    let said = ["nothing left to explain", "no free run: "];
+    let said = [
+        "nothing left to explain",
+        "no free run: ",
+        "too short to judge: ",
+    ];
     let new = |finding: &&String| !said.iter().any(|said| finding.starts_with(said));
     tests.findings.iter().filter(new).cloned().collect()
 }
@@ -72,9 +90,10 @@ pub(crate) fn test_tables(tests: &Validation) -> (Table, Table) {
     ])
     .flush_left(1)
     .flush_left(2);
-    let rows: [(&str, &Option<ResidualTest>); 4] = [
+    let rows: [(&str, &Option<ResidualTest>); 5] = [
         ("past residuals", &tests.whiteness),
         ("past inputs", &tests.past_inputs),
+        ("squares, products", &tests.linearity),
         ("same sample *", &tests.same_sample),
         ("feedback *", &tests.feedback),
     ];

@@ -13,7 +13,7 @@ use crate::report::names;
 use crate::report::overview::Overview;
 use crate::report::text::{
     Style, doubtful, findings, fit_table, gain_table, method, order_table, pole_table, test_tables,
-    verdict,
+    too_short, verdict,
 };
 use crate::validate::Validation;
 
@@ -70,10 +70,12 @@ pub(super) fn view(
         None => (String::new(), sentence.as_str()),
     };
     let doubt = summary.is_some_and(|s| doubtful(s, tests));
-    let (kind, class) = match (doubt, tests.is_some()) {
-        (true, _) => ("Doubtful", "is-doubtful"),
-        (false, true) => ("Accepted", "is-accepted"),
-        (false, false) => ("Not tested", "is-untested"),
+    let short = too_short(model, tests).is_some();
+    let (kind, class) = match (doubt, short, tests.is_some()) {
+        (true, ..) => ("Doubtful", "is-doubtful"),
+        (false, true, _) => ("Too short", "is-untested"),
+        (false, false, true) => ("Accepted", "is-accepted"),
+        (false, false, false) => ("Not tested", "is-untested"),
     };
     let remarks = summary.iter().flat_map(|s| s.warnings.clone());
     let remarks = remarks.chain(tests.iter().flat_map(|t| findings(t)));
