@@ -41,17 +41,19 @@ const CUT_RESIDUAL: f64 = 3.0;
 const MEDIAN_TO_DEVIATION: f64 = 1.482_602_218_505_602;
 /// Terms at most: what more lags would show, these show as well.
 const MOST_TERMS: usize = 36;
-/// Samples for each term and each condition: below, the robust covariance is not to be relied on.
+/// Samples for each term: below, the robust covariance, of their fourth moments, is not to be relied on.
 const SAMPLES_PER_TERM: usize = 25;
+/// Samples for each condition, of which only the projection is needed.
+const SAMPLES_PER_CONDITION: usize = 5;
 /// Lags of squares and products; then those that only inputs are squared at, so that a dead time is reached.
 const LAGS: [usize; 4] = [1, 2, 4, 8];
 const MORE_INPUT_LAGS: [usize; 6] = [3, 5, 6, 7, 9, 10];
 /// Most samples that are tested, and the length of a piece of a longer record.
 const MOST_SAMPLES: usize = 20_000;
 const FEWEST_SAMPLES: usize = 4_000;
-const PIECE: usize = 2_000;
+const PIECE: usize = 500;
 /// Multiplications that the products of terms and conditions may take.
-const EFFORT: usize = 80_000_000;
+const EFFORT: usize = 25_000_000;
 /// Directions of the robust covariance below this share of the largest say nothing.
 const NO_VARIANCE: f64 = 1e-9;
 const NORMAL_99: f64 = 2.575_829_303_548_901;
@@ -159,8 +161,7 @@ impl Linearity<'_> {
             .iter()
             .map(|p| p.outputs[0].len().saturating_sub(p.start.dropped + skip))
             .sum();
-        let most = (tested / SAMPLES_PER_TERM)
-            .saturating_sub(given)
+        let most = (tested.saturating_sub(SAMPLES_PER_CONDITION * given) / SAMPLES_PER_TERM)
             .min(MOST_TERMS);
         // Squares of every channel at least.
         if most < 2 * (r + l) {

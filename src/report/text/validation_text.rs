@@ -69,12 +69,19 @@ fn residual_tests(tests: &Validation) -> String {
         return String::new();
     }
     format!(
-        "\nTests of the residuals, {} (share: of their variance; * for information)\n{}\
+        "\nTests of the residuals, {} (share: of their variance; * for information)\n{}{}\
          \nStrongest correlations\n{}",
         count(tests.lags, "lag"),
         table.lines(),
+        linearity_tested(tests).map_or_else(String::new, |tested| wrapped("  ", tested)),
         strongest.lines()
     )
+}
+
+/// What the test of linearity looked at.
+pub(crate) fn linearity_tested(tests: &Validation) -> Option<&str> {
+    let said = |finding: &&String| finding.starts_with("linearity was ");
+    tests.findings.iter().find(said).map(String::as_str)
 }
 
 /// The tests, and the correlation of each that stands out most.

@@ -12,8 +12,8 @@ use crate::identify::{IdentifiedChannel, Model};
 use crate::report::names;
 use crate::report::overview::Overview;
 use crate::report::text::{
-    Style, doubtful, findings, fit_table, gain_table, method, order_table, pole_table, test_tables,
-    too_short, verdict,
+    Style, doubtful, findings, fit_table, gain_table, linearity_tested, method, order_table,
+    pole_table, test_tables, too_short, verdict,
 };
 use crate::validate::Validation;
 
@@ -134,7 +134,9 @@ pub(super) fn view(
             .map(Table::with_stars_marked),
         how: summary
             .map(|s| {
+                let tested = tests.and_then(linearity_tested).map(str::to_owned);
                 let how = s.explanation.iter().cloned().chain([format!("method: {}", method(s))]);
+                let how = how.chain(tested);
                 how.map(|h| format!("{}.", capitalised(&h).trim_end_matches('.'))).collect()
             })
             .unwrap_or_default(),
