@@ -413,7 +413,8 @@ impl Blocks {
                 let varx = varx(part, contender.windowed.varx.feedthrough).ok()?;
                 let radius = largest_stable_radius(varx.columns);
                 let inside = Some(radius);
-                polish(&contender.system, &varx, inside, Effort::Full)
+                // From the end on all data it is not far.
+                polish(&contender.system, &varx, inside, Effort::Referee)
                     .ok()?
                     .system
             } else {

@@ -58,6 +58,7 @@ pub(crate) fn findings(tests: &Validation) -> Vec<String> {
         "nothing left to explain",
         "no free run: ",
         "too short to judge: ",
+        "linearity was ",
     ];
     let new = |finding: &&String| !said.iter().any(|said| finding.starts_with(said));
     tests.findings.iter().filter(new).cloned().collect()
