@@ -1,6 +1,6 @@
 //! The final model: polish or not, stability, covariance, summary, the user's units.
 
-use super::candidate::cost_p_value;
+use super::candidate::{Candidate, cost_p_value};
 use super::data::Data;
 use super::error::IdentifyError;
 use super::fit::Fit;
@@ -13,7 +13,7 @@ use super::select::{Selection, Windowed};
 use super::source::Source;
 use super::stable::{largest_stable_radius, stabilised, with_poles_inside, with_stable_predictor};
 use super::summary::{
-    Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
+    Asked, Diagnostics, FreeRunRest, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
 };
 use super::truncation::LARGEST_FOR_POLISH;
 use super::varx::{Varx, varx};
@@ -43,8 +43,25 @@ pub struct Chosen {
     pub stepped: Vec<Stepped>,
     /// Longest past window that the recording allowed, where it was the choice.
     pub past_limited_to: Option<usize>,
+    /// What the free run on held-out blocks leaves, where that decided about the order.
+    pub free_run_rest: Vec<FreeRunRest>,
     /// How it was decided.
     pub explanation: Vec<String>,
+}
+
+/// Whether the final numbers are those of the polish.
+pub(super) fn polish_is_used(options: &Options, candidate: &Candidate) -> bool {
+    match options.polish {
+        Polish::Never => false,
+        Polish::Always => true,
+        Polish::Auto => {
+            options.polishes_by_default()
+                && candidate.polished.as_ref().is_some_and(|p| {
+                    candidate.truncation <= LARGEST_FOR_POLISH
+                        || p.start_cost - p.cost > GAIN_OVER_TRUNCATION * candidate.truncation
+                })
+        }
+    }
 }
 
 /// Makes the model out of what was chosen.
@@ -63,6 +80,7 @@ pub fn finish(
         past_windows,
         stepped,
         past_limited_to,
+        free_run_rest,
         mut explanation,
     } = chosen;
     let Windowed { factor, varx } = windowed;
@@ -79,17 +97,7 @@ pub fn finish(
     let order = candidate.order;
     let outputs = factor.outputs;
 
-    let use_polish = match options.polish {
-        Polish::Never => false,
-        Polish::Always => true,
-        Polish::Auto => {
-            options.polishes_by_default()
-                && candidate.polished.as_ref().is_some_and(|p| {
-                    candidate.truncation <= LARGEST_FOR_POLISH
-                        || p.start_cost - p.cost > GAIN_OVER_TRUNCATION * candidate.truncation
-                })
-        }
-    };
+    let use_polish = polish_is_used(options, &candidate);
     // Prediction error is maximum likelihood already.
     if options.polish == Polish::Auto
         && !options.polishes_by_default()
@@ -229,6 +237,7 @@ pub fn finish(
             predictor_radius: spectral_radius(&(&system.a - &system.k * &system.c))?,
             order_test,
             orders: evidence,
+            free_run_rest,
             past_windows,
             past_limited_to,
             coarse_inputs,

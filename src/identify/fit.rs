@@ -7,13 +7,13 @@ use nalgebra::DMatrix;
 use super::data::Data;
 use super::error::IdentifyError;
 use super::finish::{Chosen, finish};
-use super::free_run::low_order;
+use super::free_run::{FreeRun, by_free_run, many_states};
 use super::horizon;
 use super::memory::Sizes;
 use super::options::{Options, Order};
 use super::records::Records;
 use super::resolution::stepped;
-use super::select::{Windowed, propose, select};
+use super::select::{Selection, Windowed, propose, select};
 use super::source::Source;
 use super::summary::{PastEvidence, Summary};
 use super::truncation::past_for_truncation;
@@ -74,30 +74,82 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
     };
     let stepped = stepped(records)?;
     let mut source = Source::new(&data, records);
-    let mut chosen = windowed(&mut source, past, options)?;
+    let chosen = windowed(&mut source, past, options)?;
     // A plant that is not linear, recorded with little noise, has no linear order: its free run decides.
-    let low = low_order(&chosen, &mut source, options)?;
-    let narrowed = Options {
-        order: low
-            .as_ref()
-            .map_or_else(|| options.order.clone(), |low| Order::Fixed(low.order)),
+    let many = many_states(&chosen, options)?;
+    let at_once = if many {
+        by_free_run(&chosen, &mut source, options)?
+    } else {
+        None
+    };
+    let run = match at_once {
+        Some(run) => Ok(run),
+        None => {
+            let (chosen, selection) =
+                linear_order(chosen, longest, &mut source, options, &mut explanation)?;
+            let asked =
+                !many && matches!(options.order, Order::Auto) && selection.rejected(&chosen);
+            let run = if asked {
+                by_free_run(&chosen, &mut source, options)?
+            } else {
+                None
+            };
+            run.ok_or((chosen, selection))
+        }
+    };
+    let (chosen, selection, free_run_rest, unstable) = match run {
+        Ok(FreeRun {
+            windowed,
+            selection,
+            unstable,
+            rest,
+        }) => {
+            explanation.push(format!(
+                "past window {} for the free run",
+                windowed.factor.past
+            ));
+            (windowed, selection, rest, unstable)
+        }
+        Err((chosen, selection)) => (chosen, selection, Vec::new(), false),
+    };
+    let options = Options {
+        stable: options.stable || unstable,
         ..options.clone()
     };
-    let final_options = Options {
-        stable: options.stable || low.as_ref().is_some_and(|low| low.unstable),
-        ..options.clone()
-    };
-    let options = &narrowed;
+    finish(
+        &options,
+        &data,
+        &source,
+        Chosen {
+            windowed: chosen,
+            selection,
+            past_windows,
+            stepped,
+            past_limited_to,
+            free_run_rest,
+            explanation,
+        },
+    )
+}
+
+/// The order of a linear plant, with a past window that is long enough for its predictor.
+fn linear_order(
+    mut chosen: Windowed,
+    longest: usize,
+    source: &mut Source<'_>,
+    options: &Options,
+    explanation: &mut Vec<String>,
+) -> Result<(Windowed, Selection), IdentifyError> {
     // While the past window is too short the tests of the order have no meaning: they wait until it is chosen.
     let mut selection = if options.past.is_none() {
-        propose(&chosen, options, &mut source)?
+        propose(&chosen, options, source)?
     } else {
-        select(&chosen, options, &mut source)?
+        select(&chosen, options, source)?
     };
 
     if options.past.is_none() {
         // The past window must be long enough for the predictor of the model that it leads to.
-        let samples = data.samples;
+        let (samples, q) = (source.samples(), source.scale().len());
         let limit = horizon::longest_past(samples, q, longest).max(chosen.factor.past);
         for _ in 0..4 {
             let past = chosen.factor.past;
@@ -119,8 +171,8 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
             .unwrap_or(limit)
             // An estimate of the decay from a short window is not to be trusted far beyond it.
             .min(2 * past + 2);
-            chosen = windowed(&mut source, wanted, options)?;
-            selection = propose(&chosen, options, &mut source)?;
+            chosen = windowed(source, wanted, options)?;
+            selection = propose(&chosen, options, source)?;
             explanation.retain(|line| !line.starts_with("past window lengthened"));
             explanation.push(format!(
                 "past window lengthened to {wanted} so that what it cuts off no longer matters"
@@ -130,25 +182,10 @@ pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, Identify
         let proposal_is_final =
             matches!(options.order, Order::Fixed(_)) && !options.method.polishes_itself();
         if !proposal_is_final {
-            selection = select(&chosen, options, &mut source)?;
+            selection = select(&chosen, options, source)?;
         }
     }
-    if let Some(low) = low {
-        selection.explanation = low.explanation;
-    }
-    finish(
-        &final_options,
-        &data,
-        &source,
-        Chosen {
-            windowed: chosen,
-            selection,
-            past_windows,
-            stepped,
-            past_limited_to,
-            explanation,
-        },
-    )
+    Ok((chosen, selection))
 }
 
 /// Longest past window that comes into question for `q` channels.
@@ -253,7 +290,7 @@ fn check_windows(options: &Options, outputs: usize) -> Result<(), IdentifyError>
     Ok(())
 }
 
-fn windowed(
+pub(super) fn windowed(
     source: &mut Source<'_>,
     past: usize,
     options: &Options,

@@ -17,7 +17,7 @@
 //! | `pem` | the prediction error method in the time domain | Ljung |
 //! | `baselines` | subid, an n4sid, the methods of Knudsen's table 2 | van Overschee & De Moor; Ljung |
 //! | `order`, `select` | which order: singular values propose, a chi-square test referees | Bauer 2001 |
-//! | `free_run` | the order of a plant that is not linear: by its free run | |
+//! | `free_run` | the order of a plant that is not linear: by free runs on blocks held out | Breiman et al. 1984 |
 //! | `truncation` | what the past window cuts off | |
 //! | `polish` | the maximum-likelihood model of that order | Soderstrom, Stoica & Friedlander 1991 |
 //! | `stable` | a stable model, guaranteed | |
@@ -79,7 +79,9 @@ pub use reduced::{ReducedRecords, SAMPLES_KEPT};
 pub use resolution::CoarseChannel;
 pub use source::Source;
 pub use stochastic::Stochastic;
-pub use summary::{Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary};
+pub use summary::{
+    Asked, Diagnostics, FreeRunRest, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
+};
 pub use varx::{Varx, varx};
 pub use warnings::of_closed_loop as warnings_of_closed_loop;
 pub use weighted::WeightedSvd;

@@ -11,6 +11,7 @@ use super::summary::Summary;
 use crate::covariance::ParameterCovariance;
 use crate::log::{Channel, Log};
 use crate::model::{StateSpace, estimate_initial_state};
+use crate::moments::Detrend;
 
 /// An input or output of a model.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,8 +77,8 @@ pub fn identify_records(
     records: &mut dyn Records,
     options: &Options,
 ) -> Result<Model, IdentifyError> {
-    let fit = fit(records, options)?;
-    let initial_state = initial_state(records, &fit)?;
+    let mut fit = fit(records, options)?;
+    let initial_state = start(records, &mut fit, options)?;
     let Fit {
         system,
         covariance,
@@ -112,17 +113,75 @@ pub fn identify_records(
     })
 }
 
-fn initial_state(records: &mut dyn Records, fit: &Fit) -> Result<DVector<f64>, IdentifyError> {
+/// The initial state of the first recording; with it the operating point of the outputs, where the recording says that it
+/// is not the mean.
+///
+/// The mean of a recording that begins or ends away from rest, or whose noise is slow, is not the output that belongs
+/// to the mean of the inputs, and a free run would be off by the difference for good. The difference is a state that
+/// stands still, seen by the output alone, and is estimated as such, together with the initial state.
+fn start(
+    records: &mut dyn Records,
+    fit: &mut Fit,
+    options: &Options,
+) -> Result<DVector<f64>, IdentifyError> {
     let kept = records.kept_samples(0).min(INITIAL_STATE_SAMPLES);
     let columns = deviations(records, 0, &fit.delays, &fit.first_trend, Some(kept))?;
     let (inputs, outputs) = columns.split_at(fit.system.inputs());
     let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
     let outputs: Vec<&[f64]> = outputs.iter().map(Vec::as_slice).collect();
-    Ok(estimate_initial_state(
-        &fit.system,
-        &inputs,
-        &outputs,
-        Some(&fit.innovation_covariance),
-    )
-    .unwrap_or_else(|_| DVector::zeros(fit.system.states())))
+    let (n, l) = (fit.system.states(), fit.system.outputs());
+    let lambda = &fit.innovation_covariance;
+    let plain = estimate_initial_state(&fit.system, &inputs, &outputs, Some(lambda))
+        .unwrap_or_else(|_| DVector::zeros(n));
+    // Of several recordings each has a mean of its own, and a line that was taken out has taken the mean with it.
+    if options.detrend != Detrend::Mean || records.experiments() > 1 {
+        return Ok(plain);
+    }
+    let with_level = standing_state(&fit.system);
+    let Ok(moved) = estimate_initial_state(&with_level, &inputs, &outputs, Some(lambda)) else {
+        return Ok(plain);
+    };
+    let cost = |system: &StateSpace, state: &DVector<f64>| -> Option<f64> {
+        let innovations = system
+            .one_step(&inputs, &outputs, Some(state))
+            .ok()?
+            .innovations;
+        let inverse = lambda.clone().cholesky()?.inverse();
+        let samples = innovations.first()?.len();
+        let of = |k: usize| DVector::from_fn(l, |o, _| innovations[o][k]);
+        Some((0..samples).map(|k| of(k).dot(&(&inverse * of(k)))).sum())
+    };
+    let gain = cost(&fit.system, &plain)
+        .zip(cost(&with_level, &moved))
+        .map(|(without, with)| without - with);
+    // Akaike's criterion: a level that the recording does not show stays where it is.
+    if gain.is_some_and(|gain| gain > 2.0 * l as f64) {
+        let levels = &mut fit.levels[inputs.len()..];
+        for (level, shift) in levels.iter_mut().zip(moved.rows(n, l).iter()) {
+            *level += shift;
+        }
+        return Ok(moved.rows(0, n).into_owned());
+    }
+    Ok(plain)
+}
+
+/// The system with a constant added to each output, as states that stand still.
+fn standing_state(system: &StateSpace) -> StateSpace {
+    let (n, l) = (system.states(), system.outputs());
+    let mut a = DMatrix::identity(n + l, n + l);
+    a.view_mut((0, 0), (n, n)).copy_from(&system.a);
+    let mut c = DMatrix::identity(l, n + l);
+    c.view_mut((0, 0), (l, n)).copy_from(&system.c);
+    for o in 0..l {
+        for i in 0..l {
+            c[(o, n + i)] = f64::from(u8::from(o == i));
+        }
+    }
+    StateSpace {
+        a,
+        b: system.b.clone().resize_vertically(n + l, 0.0),
+        k: system.k.clone().resize_vertically(n + l, 0.0),
+        c,
+        ..system.clone()
+    }
 }

@@ -49,6 +49,19 @@ pub struct Selection {
     pub noise_free: bool,
 }
 
+impl Selection {
+    /// Whether the chi-square test rejects the order, over a past window that is long enough for this test.
+    pub fn rejected(&self, windowed: &Windowed) -> bool {
+        let varx = &windowed.varx;
+        let freedom = varx.coefficients.nrows() * varx.degrees_of_freedom();
+        self.candidate.truncation <= LARGEST_FOR_POLISH
+            && self.candidate.polished.as_ref().is_some_and(|p| {
+                cost_p_value(p.cost, p.degrees_of_freedom, freedom)
+                    .is_some_and(|p| p < order::REFEREE_LEVEL)
+            })
+    }
+}
+
 /// The model of the order that is asked for or that the singular values propose, without any test of it.
 ///
 /// # Errors

@@ -35,9 +35,10 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The moments and the recordings.
-    pub(super) fn parts(&mut self) -> (&'a Data, &mut dyn Records) {
-        (self.data, self.records)
+    /// Names of the outputs.
+    pub(super) fn output_names(&self) -> Vec<String> {
+        let outputs = self.records.outputs();
+        outputs.iter().map(|channel| channel.name.clone()).collect()
     }
 
     /// What is known of the sizes of an identification: channels and lags.
@@ -79,6 +80,11 @@ impl<'a> Source<'a> {
         self.data.factors_without_blocks(past)
     }
 
+    /// Samples of all experiments.
+    pub(super) fn samples(&self) -> usize {
+        self.data.samples
+    }
+
     /// Number of experiments.
     pub fn experiments(&self) -> usize {
         self.records.experiments()
@@ -105,9 +111,30 @@ impl<'a> Source<'a> {
                 reason: "this method looks at every sample",
             });
         }
+        self.scaled(experiment, None)
+    }
+
+    /// The first of these samples, at most `limit` and at most what is still in memory.
+    ///
+    /// # Errors
+    /// When reading fails.
+    pub(super) fn first_signals(
+        &mut self,
+        experiment: usize,
+        limit: usize,
+    ) -> Result<Vec<Vec<f64>>, IdentifyError> {
+        let kept = self.records.kept_samples(experiment).max(1);
+        self.scaled(experiment, Some(kept.min(limit)))
+    }
+
+    fn scaled(
+        &mut self,
+        experiment: usize,
+        limit: Option<usize>,
+    ) -> Result<Vec<Vec<f64>>, IdentifyError> {
         let trend = self.data.trend(experiment);
         let delays = self.data.delays();
-        let mut columns = deviations(self.records, experiment, delays, trend, None)?;
+        let mut columns = deviations(self.records, experiment, delays, trend, limit)?;
         for (column, scale) in columns.iter_mut().zip(&self.data.scale) {
             for value in column {
                 *value /= scale;

@@ -31,6 +31,18 @@ pub struct OrderTest {
     pub p_value: Option<f64>,
 }
 
+/// What a linear model cannot hold of an output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct FreeRunRest {
+    /// Name of the output.
+    pub output: String,
+    /// Root mean square error of the free run on blocks held out, as a share of that of the output.
+    pub share: f64,
+    /// From where to where nine tenths of its power lie, in hertz.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub band_hz: Option<[f64; 2]>,
+}
+
 /// What stability cost.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct StabilityCost {
@@ -97,6 +109,9 @@ pub struct Diagnostics {
     /// Evidence on every order that was looked at.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub orders: Vec<OrderEvidence>,
+    /// What the free run on held-out blocks leaves of each output, where that decided about the order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub free_run_rest: Vec<FreeRunRest>,
     /// Evidence on the past windows.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub past_windows: Vec<PastEvidence>,

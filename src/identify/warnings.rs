@@ -53,6 +53,18 @@ pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Option
             summary.order, test.chi_square, test.degrees_of_freedom
         ));
     }
+    out.extend(summary.diagnostics.free_run_rest.iter().map(|rest| {
+        let band = rest.band_hz.map_or_else(String::new, |[from, to]| {
+            format!(", nine tenths of it between {from:.3e} and {to:.3e} Hz")
+        });
+        format!(
+            "a linear model of order {} does not hold {:.3} % of the motion of {} (rms error of the free run on parts of \
+             the recording held out){band}",
+            summary.order,
+            100.0 * rest.share,
+            rest.output
+        )
+    }));
     // A model of as many states as the regression has past outputs is that regression itself, whose predictor forgets all
     // beyond the window: it says that nothing is cut off, whatever is.
     let whole_regression = summary.horizons.past * varx.innovation_covariance.nrows();

@@ -25,6 +25,7 @@ mod factor;
 mod gram;
 mod lag_moments;
 mod panel_qr;
+mod spectrum;
 mod trend;
 
 pub use accumulator::LagAccumulator;
@@ -33,4 +34,6 @@ pub use factor::{MomentError, RFactor, Route};
 pub use gram::Gram;
 pub use lag_moments::LagMoments;
 pub use panel_qr::PanelQr;
+pub use spectrum::Excitation;
+pub(crate) use spectrum::Welch;
 pub use trend::{Detrend, Trend};

@@ -105,6 +105,16 @@ impl FitSums {
     }
 }
 
+/// Error below this share of the output that is left to rounding: the square root of working precision.
+const EXACT: f64 = 1.5e-8;
+
+impl FitMeasure {
+    /// Whether what is left is rounding.
+    pub fn exact(&self) -> bool {
+        self.fit_percent > 100.0 * (1.0 - EXACT)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -10,6 +10,7 @@
 //! | whiteness (Hosking 1980) | `e[k]` | `e[k-1..k-M]` | nothing |
 //! | past inputs (Granger 1969) | `e[k]` | `u[k-1..k-M]` | `e[k-1..k-a]` |
 //! | same sample, for information | `e[k]` | `u[k]` | `e[k-1..k-a]`, `u[k-1..k-M]` |
+//! | linearity (Lee, White and Granger 1993) | `e[k]` | squares and products of `u[k-i]`, `y[k-i]` | all that is linear |
 //! | feedback, for information (Caines and Chan 1975) | `u[k]` | `e[k-1..k-M]` | `u[k-1..k-b]` |
 //!
 //! - *Closed loop.* Feedback makes future inputs depend on `e[k]`, so only past inputs are tested. The input of the
@@ -25,6 +26,9 @@
 //!   widens it too.
 //! - *Offsets.* Means over the record are taken out of inputs and residuals, and reported with the fit.
 //!
+//! - *Linearity.* Correlations only see what is linear. The residual is tested against squares and products of past
+//!   inputs and outputs as well, given all that is linear in the past, see `linearity`.
+//!
 //! Because everything is significant in a long record, each test says which share of the variance it is
 //! about (`R^2`, adjusted for degrees of freedom).
 //!
@@ -34,6 +38,8 @@
 //! | `partial`, `own_past` | partial correlations from lag products; how much past to allow for |
 //! | `filters`, `sensitivity`, `curvature` | what the errors of the parameters do, first and second order |
 //! | `statistic` | statistic, degrees of freedom, bounds |
+//! | `linearity` | squares and products of the past |
+//! | `length` | how long a record must be for any of this |
 //! | `innovation_size` | residual variance against the stated one |
 //! | `deviations` | recordings in the units of the user, as a model sees them |
 //! | `identified` | identification with the tests that belong to it |
@@ -49,6 +55,8 @@ mod filters;
 mod fit_measure;
 mod identified;
 mod innovation_size;
+mod length;
+mod linearity;
 mod options;
 mod own_past;
 mod partial;
@@ -64,10 +72,11 @@ mod tests;
 pub use deviations::{Deviations, Zero, judge};
 pub use error::ValidateError;
 pub use identified::{TestedModel, identify_and_test, test_residuals};
+pub(crate) use length::too_short;
 pub use options::{RecordView, Relation, ValidationOptions};
 pub use result::{
-    FitMeasure, InnovationSize, OutputFit, OutputSize, PairCorrelation, ResidualTest, Strongest,
-    Validation,
+    FitMeasure, InnovationSize, LinearityScope, OutputFit, OutputSize, PairCorrelation,
+    ResidualTest, Strongest, TooShort, Validation,
 };
 pub(crate) use sensitivity::numbers as numbers_of_tests;
 
@@ -75,6 +84,7 @@ use nalgebra::DMatrix;
 
 use crate::covariance::ParameterCovariance;
 use crate::model::StateSpace;
+use linearity::Linearity;
 use partial::Partial;
 use residuals::Residuals;
 use sensitivity::{Regressor, Sensitivity};
@@ -82,6 +92,8 @@ use statistic::{Outcome, ScoreCovariance, outcome};
 
 /// Most lags tested by default.
 const MOST_LAGS: usize = 25;
+/// Samples of each channel for one lag, by default.
+const SAMPLES_PER_LAG: usize = 10;
 /// Samples wanted for each tested or conditioning regressor.
 const SAMPLES_PER_REGRESSOR: usize = 3;
 
@@ -111,7 +123,7 @@ pub fn validate(
     let samples: usize = records.iter().map(RecordView::samples).sum();
     let lags = options
         .lags
-        .unwrap_or_else(|| (samples / (10 * q)).clamp(1, MOST_LAGS));
+        .unwrap_or_else(|| (samples / (SAMPLES_PER_LAG * q)).clamp(1, MOST_LAGS));
     let longest = own_past::longest(samples, q);
     let past = lags.max(longest);
     let needed_columns = q
@@ -171,6 +183,28 @@ pub fn validate(
         innovation_size::innovation_size(stated, &residuals, lags, sensitivity, relation, options)
     });
 
+    let linearity = Linearity {
+        system,
+        covariance,
+        innovation_covariance,
+        records,
+        residuals: &residuals,
+        lags,
+        own_past: tests.own_past,
+        feedthrough,
+        options,
+    }
+    .test()?;
+    let (linearity, linearity_scope) = linearity.unzip();
+    let fitted = covariance.filter(|_| relation == Relation::Estimation);
+    let too_short = too_short(
+        (system.states(), r, l),
+        fitted.map_or(0, |c| c.layout.identifiable()),
+        residuals.samples,
+    )
+    // What is exact to rounding leaves no doubt, and what is rejected is rejected.
+    .filter(|_| !one_step.exact());
+
     let mut validation = Validation {
         relation,
         samples: residuals.samples,
@@ -188,6 +222,9 @@ pub fn validate(
         own_past_lags: tests.own_past,
         same_sample: same_sample.map(|tested| tested.result),
         feedback: feedback.map(|tested| tested.result),
+        linearity,
+        linearity_scope,
+        too_short,
         innovation_size,
         rejected: false,
         findings: Vec::new(),

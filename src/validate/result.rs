@@ -38,6 +38,16 @@ pub struct Validation {
     pub same_sample: Option<ResidualTest>,
     /// Do past residuals act on the inputs? Then the record was taken in closed loop. Information only.
     pub feedback: Option<ResidualTest>,
+    /// Are the residuals free of squares and products of past inputs and outputs? Missing when the record is too short
+    /// for this test, or when the residuals vanish.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub linearity: Option<ResidualTest>,
+    /// What the test of linearity looked at.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub linearity_scope: Option<LinearityScope>,
+    /// There when the record is too short for the tests to speak against a model of this order, right or wrong.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub too_short: Option<TooShort>,
     /// Residual size against the innovation covariance that the model states.
     pub innovation_size: Option<InnovationSize>,
     /// Autocorrelations of the residuals for every pair of outputs.
@@ -95,6 +105,32 @@ pub struct ResidualTest {
     pub explained_share_by_channel: Vec<f64>,
     /// The correlation that exceeds its bound most.
     pub strongest: Option<Strongest>,
+}
+
+/// What the test of linearity looked at.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct LinearityScope {
+    /// Samples tested.
+    pub samples: usize,
+    /// Pieces of the records that these are in: more than records when only a part of them was tested.
+    pub pieces: usize,
+    /// Squares and products tested.
+    pub terms: usize,
+    /// How many samples back they go.
+    pub longest_lag: usize,
+    /// The same as a sentence.
+    pub sentence: String,
+}
+
+/// A recording that cannot tell a right model of this order from a wrong one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct TooShort {
+    /// Samples of the recording.
+    pub samples: usize,
+    /// Numbers that were estimated from it: parameters, initial state, operating point.
+    pub parameters: usize,
+    /// Samples from which the tests have something to say.
+    pub needed: usize,
 }
 
 /// The correlation that stands out most.

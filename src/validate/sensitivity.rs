@@ -325,7 +325,7 @@ impl Segment {
 }
 
 /// Basis of the parameter space (columns), covariance of the coordinates, and rank.
-fn directions(
+pub(super) fn directions(
     covariance: &ParameterCovariance,
     whole_space: bool,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>, usize), ValidateError> {

@@ -49,6 +49,7 @@ pub(super) fn decide(validation: &mut Validation, noise_model: bool) {
             .as_ref()
             .map(|size| size.p_value)
             .filter(|_| fresh),
+        p(&validation.linearity),
     ];
     let rejected = holm(&family, validation.level);
     let level = validation.level;
@@ -80,9 +81,16 @@ pub(super) fn decide(validation: &mut Validation, noise_model: bool) {
                 }),
         );
     }
+    if let (Some(test), true) = (&validation.linearity, rejected[3]) {
+        findings.push(linearity_finding(test));
+    }
     validation.rejected = rejected.iter().any(|r| *r);
+    // A rejection needs no more samples than it had.
+    validation.too_short = validation.too_short.filter(|_| !validation.rejected);
     if !validation.rejected {
-        findings.push(if family.iter().all(Option::is_none) {
+        findings.push(if let Some(short) = &validation.too_short {
+            short.sentence()
+        } else if family.iter().all(Option::is_none) {
             "no test of the residuals applies: judge the model by its fit".to_owned()
         } else {
             format!(
@@ -91,6 +99,13 @@ pub(super) fn decide(validation: &mut Validation, noise_model: bool) {
             )
         });
     }
+    findings.push(match &validation.linearity_scope {
+        Some(scope) => scope.sentence.clone(),
+        None => {
+            "linearity was not tested: the recording is too short for it, or the residuals vanish"
+                .to_owned()
+        }
+    });
     if let (Some(test), false) = (&validation.whiteness, noise_model)
         && test.p_value < level
     {
@@ -151,6 +166,21 @@ fn whiteness_finding(test: &ResidualTest) -> String {
     format!(
         "past residuals predict {} of the residual variance{}: the noise model is not right, so the stated \
          uncertainty is not either; try a higher --order or a longer --past, or use --covariance robust{}",
+        percent(test.explained_share),
+        most(test),
+        if test.explained_share < SMALL_SHARE {
+            " (the part is small)"
+        } else {
+            ""
+        }
+    )
+}
+
+fn linearity_finding(test: &ResidualTest) -> String {
+    format!(
+        "squares and products of past inputs and outputs predict {} of the residual variance{}: the plant is not linear \
+         over this recording, and the model is the best linear approximation of it here; its uncertainty is that \
+         of a linear plant (use --covariance robust), and another range of motion has another model{}",
         percent(test.explained_share),
         most(test),
         if test.explained_share < SMALL_SHARE {

@@ -11,7 +11,8 @@ class Validation:
     """Fit and residual tests, with the keys of ``innovant validate --format json`` as attributes.
 
     `rejected` is the verdict; `findings` says why in sentences; `one_step` and `free_run` are fits; `whiteness`,
-    `past_inputs`, `same_sample`, `feedback` are tests, each with `p_value` and `explained_share`.
+    `past_inputs`, `linearity`, `same_sample`, `feedback` are tests, each with `p_value` and `explained_share`;
+    `too_short` is there when the recording is too short to judge a model of this order.
     """
 
     def __init__(self, text: str, json: str) -> None:

@@ -4,14 +4,12 @@
 //! | file       | one idea                                            |
 //! |------------|-----------------------------------------------------|
 //! | `envelope` | the smallest and the largest value of each stretch  |
-//! | `spectrum` | Welch's averaged periodogram                        |
 
 mod envelope;
-mod spectrum;
 
+pub use crate::moments::Excitation;
+use crate::moments::Welch;
 use envelope::Envelope;
-pub use spectrum::Excitation;
-use spectrum::Welch;
 
 use crate::identify::{Recording, Records};
 use crate::log::{Channel, LogError};

@@ -21,9 +21,9 @@ pub(crate) use roots::{gain_table, pole_table};
 pub use show::show_text;
 pub(crate) use table::Table;
 pub use validation_text::validation_text;
-pub(crate) use validation_text::{findings, test_tables};
-pub(crate) use verdict::doubtful;
+pub(crate) use validation_text::{findings, linearity_tested, test_tables};
 pub use verdict::verdict;
+pub(crate) use verdict::{doubtful, too_short};
 
 /// Widest line.
 pub const WIDTH: usize = 100;

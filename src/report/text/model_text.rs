@@ -6,7 +6,7 @@ use super::number::{percent, significant};
 use super::orders::order_evidence;
 use super::roots::{poles, shortened, static_gains};
 use super::table::Table;
-use super::validation_text::findings;
+use super::validation_text::{findings, linearity_tested};
 use super::verdict::verdict;
 use super::{Style, comparison, wrapped};
 use crate::covariance::{Invariants, invariants};
@@ -52,6 +52,9 @@ pub fn model_text(text: &ModelText<'_>) -> String {
             order_evidence(summary)
         });
         out.push_str(&how(summary));
+        if let Some(tested) = tests.and_then(linearity_tested) {
+            out.push_str(&wrapped("  ", tested));
+        }
         let warnings = summary.warnings.iter().map(|w| ("warning: ", w));
         let found = tests.map(findings).unwrap_or_default();
         let found = found.iter().map(|f| ("finding: ", f));

@@ -19,10 +19,13 @@ pub fn validation_text(tests: &Validation) -> String {
             tests.samples,
             percent(100.0 * tests.level)
         )
+    } else if let Some(short) = &tests.too_short {
+        format!("On {data}: {}", short.sentence())
     } else {
         format!(
-            "Model accepted on {data} ({} samples): nothing speaks against it",
-            tests.samples
+            "Model accepted on {data} ({} samples): {}",
+            tests.samples,
+            in_words(tests)
         )
     };
     let mut out = wrapped("", &verdict);
@@ -38,9 +41,25 @@ pub fn validation_text(tests: &Validation) -> String {
     out
 }
 
+/// What an acceptance rests on.
+pub(crate) fn in_words(tests: &Validation) -> &'static str {
+    match (&tests.whiteness, &tests.linearity) {
+        (_, Some(_)) => "nothing left to explain, the residuals are white and linear in the past",
+        (Some(_), None) => {
+            "nothing left to explain, the residuals are white; linearity was not tested"
+        }
+        (None, None) => "nothing speaks against it; linearity was not tested",
+    }
+}
+
 /// The findings but those that the tables say already: that nothing was found, why there is no free run.
 pub(crate) fn findings(tests: &Validation) -> Vec<String> {
-    let said = ["nothing left to explain", "no free run: "];
+    let said = [
+        "nothing left to explain",
+        "no free run: ",
+        "too short to judge: ",
+        "linearity was ",
+    ];
     let new = |finding: &&String| !said.iter().any(|said| finding.starts_with(said));
     tests.findings.iter().filter(new).cloned().collect()
 }
@@ -51,12 +70,19 @@ fn residual_tests(tests: &Validation) -> String {
         return String::new();
     }
     format!(
-        "\nTests of the residuals, {} (share: of their variance; * for information)\n{}\
+        "\nTests of the residuals, {} (share: of their variance; * for information)\n{}{}\
          \nStrongest correlations\n{}",
         count(tests.lags, "lag"),
         table.lines(),
+        linearity_tested(tests).map_or_else(String::new, |tested| wrapped("  ", tested)),
         strongest.lines()
     )
+}
+
+/// What the test of linearity looked at.
+pub(crate) fn linearity_tested(tests: &Validation) -> Option<&str> {
+    let said = |finding: &&String| finding.starts_with("linearity was ");
+    tests.findings.iter().find(said).map(String::as_str)
 }
 
 /// The tests, and the correlation of each that stands out most.
@@ -72,9 +98,10 @@ pub(crate) fn test_tables(tests: &Validation) -> (Table, Table) {
     ])
     .flush_left(1)
     .flush_left(2);
-    let rows: [(&str, &Option<ResidualTest>); 4] = [
+    let rows: [(&str, &Option<ResidualTest>); 5] = [
         ("past residuals", &tests.whiteness),
         ("past inputs", &tests.past_inputs),
+        ("squares, products", &tests.linearity),
         ("same sample *", &tests.same_sample),
         ("feedback *", &tests.feedback),
     ];

@@ -2,8 +2,9 @@
 
 use super::count;
 use super::number::significant;
+use super::validation_text::in_words;
 use crate::identify::{Model, Summary};
-use crate::validate::Validation;
+use crate::validate::{self, TooShort, Validation};
 
 /// Level below which the test of the order speaks against the model.
 const ORDER_TEST_LEVEL: f64 = 0.01;
@@ -23,7 +24,7 @@ pub fn verdict(model: &Model, tests: Option<&Validation>) -> String {
         Some(summary) => format!(
             "{size}, {} samples, {sample_time} s: {}",
             summary.samples,
-            judgement(summary, tests)
+            judgement(model, summary, tests)
         ),
     }
 }
@@ -41,12 +42,30 @@ fn order_too_low(summary: &Summary) -> bool {
         .is_some_and(|p| p < ORDER_TEST_LEVEL)
 }
 
-fn judgement(summary: &Summary, tests: Option<&Validation>) -> String {
+/// The recording is too short for anything to speak against the model.
+pub(crate) fn too_short(model: &Model, tests: Option<&Validation>) -> Option<TooShort> {
+    match (tests, &model.summary) {
+        (Some(tests), _) => tests.too_short,
+        // No test could be made at all.
+        (None, Some(summary)) => {
+            let system = &model.system;
+            let size = (system.states(), system.inputs(), system.outputs());
+            let parameters = model.covariance.as_ref()?.layout.identifiable();
+            validate::too_short(size, parameters, summary.samples)
+        }
+        (None, None) => None,
+    }
+}
+
+fn judgement(model: &Model, summary: &Summary, tests: Option<&Validation>) -> String {
     let order_too_low = order_too_low(summary);
-    let vanished = tests.is_some_and(|t| t.whiteness.is_none() && t.past_inputs.is_none());
+    let vanished = tests.is_some_and(|t| t.one_step.exact());
+    let short = too_short(model, tests).filter(|_| !order_too_low);
     let rejected = tests.is_some_and(|t| t.rejected);
     let unstable_predictor = summary.diagnostics.predictor_radius >= 1.0;
-    let main = if unstable_predictor {
+    let main = if let Some(short) = short {
+        return short.sentence();
+    } else if unstable_predictor {
         "not to be trusted, its one-step predictor is unstable"
     } else if rejected {
         "rejected, the recording holds more than it explains"
@@ -54,8 +73,8 @@ fn judgement(summary: &Summary, tests: Option<&Validation>) -> String {
         "the recording holds more than it explains"
     } else if vanished {
         "exact to rounding"
-    } else if tests.is_some() {
-        "nothing left to explain"
+    } else if let Some(tests) = tests {
+        in_words(tests)
     } else {
         "identified"
     };

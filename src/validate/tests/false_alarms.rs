@@ -63,7 +63,13 @@ fn identified_in_open_loop() {
     assert_level(
         "open loop, own",
         &own,
-        &["whiteness", "past inputs", "feedback", "same sample"],
+        &[
+            "whiteness",
+            "past inputs",
+            "linearity",
+            "feedback",
+            "same sample",
+        ],
     );
     let fresh = study(100, |s| {
         judged_fit(&fits[s as usize], &plant.record(1500, s + 5000), Fresh)

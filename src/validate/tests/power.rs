@@ -68,6 +68,45 @@ fn noise_twice_as_large_as_stated() {
     }
 }
 
+/// A right linear model of the motion about the middle, with a sensor or an actuator that is not linear: white residuals
+/// are not enough.
+#[test]
+fn a_plant_that_is_not_linear() {
+    let plant = two_by_two();
+    let bends: [fn(f64) -> f64; 3] = [
+        |v| v + 0.1 * v * v,
+        |v| v.clamp(-1.0, 1.0),
+        |v| v.signum() * (v.abs() - 0.3).max(0.0),
+    ];
+    for bend in bends {
+        let studies = study(20, |s| {
+            let mut log = plant.record(3000, s);
+            // What is recorded is what the command was; the plant has seen something else.
+            let seen = log.input_data.clone();
+            let mut bent = plant.clone();
+            bent.innovation_covariance *= 0.05;
+            for (column, seen) in log.input_data.iter_mut().zip(&seen) {
+                *column = seen.iter().map(|v| bend(*v)).collect();
+            }
+            let inputs: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
+            let run = bent.system.simulate(&inputs, None).unwrap();
+            let noise = bent.record(3000, s + 50);
+            for (o, column) in log.output_data.iter_mut().enumerate() {
+                for (k, y) in column.iter_mut().enumerate() {
+                    *y = run[o][k] + 0.02 * noise.output_data[o][k];
+                }
+            }
+            log.input_data = seen;
+            judged_fit(&identified(&log, 3), &log, Estimation)
+        });
+        let found = studies
+            .iter()
+            .filter(|v| v.rejected && v.linearity.as_ref().is_some_and(|t| t.p_value < 1e-4));
+        assert_eq!(found.count(), 20);
+        assert!(studies[0].findings.iter().any(|f| f.contains("not linear")));
+    }
+}
+
 /// Direct feedthrough that the model leaves out, and the same taken into account.
 #[test]
 fn feedthrough() {

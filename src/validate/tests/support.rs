@@ -112,6 +112,7 @@ fn p_value(validation: &Validation, test: &str) -> f64 {
     match test {
         "whiteness" => of(&validation.whiteness),
         "past inputs" => of(&validation.past_inputs),
+        "linearity" => of(&validation.linearity),
         "same sample" => of(&validation.same_sample),
         "feedback" => of(&validation.feedback),
         "size" => validation.innovation_size.as_ref().map(|s| s.p_value),

@@ -12,8 +12,8 @@ use crate::identify::{IdentifiedChannel, Model};
 use crate::report::names;
 use crate::report::overview::Overview;
 use crate::report::text::{
-    Style, doubtful, findings, fit_table, gain_table, method, order_table, pole_table, test_tables,
-    verdict,
+    Style, doubtful, findings, fit_table, gain_table, linearity_tested, method, order_table,
+    pole_table, test_tables, too_short, verdict,
 };
 use crate::validate::Validation;
 
@@ -70,10 +70,12 @@ pub(super) fn view(
         None => (String::new(), sentence.as_str()),
     };
     let doubt = summary.is_some_and(|s| doubtful(s, tests));
-    let (kind, class) = match (doubt, tests.is_some()) {
-        (true, _) => ("Doubtful", "is-doubtful"),
-        (false, true) => ("Accepted", "is-accepted"),
-        (false, false) => ("Not tested", "is-untested"),
+    let short = too_short(model, tests).is_some();
+    let (kind, class) = match (doubt, short, tests.is_some()) {
+        (true, ..) => ("Doubtful", "is-doubtful"),
+        (false, true, _) => ("Too short", "is-untested"),
+        (false, false, true) => ("Accepted", "is-accepted"),
+        (false, false, false) => ("Not tested", "is-untested"),
     };
     let remarks = summary.iter().flat_map(|s| s.warnings.clone());
     let remarks = remarks.chain(tests.iter().flat_map(|t| findings(t)));
@@ -132,7 +134,9 @@ pub(super) fn view(
             .map(Table::with_stars_marked),
         how: summary
             .map(|s| {
+                let tested = tests.and_then(linearity_tested).map(str::to_owned);
                 let how = s.explanation.iter().cloned().chain([format!("method: {}", method(s))]);
+                let how = how.chain(tested);
                 how.map(|h| format!("{}.", capitalised(&h).trim_end_matches('.'))).collect()
             })
             .unwrap_or_default(),

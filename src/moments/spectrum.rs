@@ -25,7 +25,7 @@ pub struct Excitation {
 
 /// Gathers a spectrum.
 #[derive(Default)]
-pub(super) struct Welch {
+pub(crate) struct Welch {
     /// Samples that are not used up.
     waiting: Vec<f64>,
     /// Sums of periodograms, at multiples of the inverse of the length of a segment.
@@ -38,7 +38,7 @@ pub(super) struct Welch {
 
 impl Welch {
     /// Goes on by these samples.
-    pub(super) fn push(&mut self, values: &[f64]) {
+    pub(crate) fn push(&mut self, values: &[f64]) {
         self.waiting.extend_from_slice(values);
         self.long |= self.waiting.len() >= SEGMENT * SEGMENTS;
         if self.long {
@@ -47,7 +47,7 @@ impl Welch {
     }
 
     /// Says that there are no more.
-    pub(super) fn end(&mut self) {
+    pub(crate) fn end(&mut self) {
         let length = (self.waiting.len() / SEGMENTS + 1).next_power_of_two() / 2;
         if !self.long && length >= SHORTEST {
             self.segments(length);
@@ -91,7 +91,7 @@ impl Welch {
     }
 
     /// The spectrum, from the first frequency above zero; `None` for a signal that is too short or does not move.
-    pub(super) fn excitation(&self, sample_time: f64) -> Option<Excitation> {
+    pub(crate) fn excitation(&self, sample_time: f64) -> Option<Excitation> {
         let length = self.window.len();
         let power = self.power.get(1..)?;
         let total: f64 = power.iter().sum();
