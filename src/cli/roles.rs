@@ -32,6 +32,7 @@ impl RoleFlags {
             outputs: self.outputs,
             time: self.time,
             sample_time: self.dt,
+            ..Roles::default()
         }
     }
 
@@ -67,6 +68,7 @@ impl RoleFlags {
             outputs: replaced("outputs", self.outputs, outputs)?.or(named.outputs),
             time: self.time,
             sample_time: self.dt,
+            ..Roles::default()
         })
     }
 }
