@@ -4,8 +4,32 @@ use super::parse::finite;
 
 /// Words for a value that is not there. An infinity is none of them: it is what a sensor beyond its range gives.
 const MISSING: [&str; 26] = [
-    "", "nan", "-nan", "+nan", "nan(ind)", "-nan(ind)", "na", "n/a", "#n/a", "#na", "#nv", "<na>", "null", "none", "nil",
-    "missing", "no data", "nodata", "bad", "-", "--", "---", "?", "\\n", "#value!", "#div/0!",
+    "",
+    "nan",
+    "-nan",
+    "+nan",
+    "nan(ind)",
+    "-nan(ind)",
+    "na",
+    "n/a",
+    "#n/a",
+    "#na",
+    "#nv",
+    "<na>",
+    "null",
+    "none",
+    "nil",
+    "missing",
+    "no data",
+    "nodata",
+    "bad",
+    "-",
+    "--",
+    "---",
+    "?",
+    "\\n",
+    "#value!",
+    "#div/0!",
 ];
 
 /// Whether a cell says that there is no value.
@@ -37,8 +61,15 @@ impl Mark {
                 return Some(value);
             }
         }
-        let plain: String = cell.chars().filter(|c| !matches!(c, '\u{a0}' | '\u{202f}' | ' ' | '\'')).collect();
-        let text = if plain.len() == cell.len() { cell } else { plain.as_str() };
+        let plain: String = cell
+            .chars()
+            .filter(|c| !matches!(c, '\u{a0}' | '\u{202f}' | ' ' | '\''))
+            .collect();
+        let text = if plain.len() == cell.len() {
+            cell
+        } else {
+            plain.as_str()
+        };
         if text.len() != cell.len() && !spaced(cell) {
             return None;
         }
@@ -77,8 +108,16 @@ fn grouped(text: &str, separator: char) -> bool {
 /// Whether spaces or apostrophes stand between groups of three digits only.
 fn spaced(cell: &str) -> bool {
     let whole = cell.split(['.', ',']).next().unwrap_or_default();
-    let same: String =
-        whole.chars().map(|c| if matches!(c, '\u{a0}' | '\u{202f}' | ' ' | '\'') { ' ' } else { c }).collect();
+    let same: String = whole
+        .chars()
+        .map(|c| {
+            if matches!(c, '\u{a0}' | '\u{202f}' | ' ' | '\'') {
+                ' '
+            } else {
+                c
+            }
+        })
+        .collect();
     let rest = cell.get(whole.len()..).unwrap_or_default();
     grouped(&same, ' ') && !rest.contains(['\u{a0}', '\u{202f}', ' ', '\''])
 }
@@ -133,10 +172,17 @@ pub(super) fn fields<'a>(line: &'a str, separator: u8, into: &mut Vec<&'a str>) 
     let mut rest = line;
     loop {
         let trimmed = rest.trim_start_matches(|c| c == ' ' || (c == '\t' && separator != b'\t'));
-        let quote = trimmed.as_bytes().first().copied().filter(|b| matches!(b, b'"' | b'\''));
+        let quote = trimmed
+            .as_bytes()
+            .first()
+            .copied()
+            .filter(|b| matches!(b, b'"' | b'\''));
         let inside = quote.and_then(|quote| closing(trimmed, quote, separator));
         let (field, after) = match inside {
-            Some(end) => (trimmed.get(1..end), trimmed.get(end + 1..).unwrap_or_default()),
+            Some(end) => (
+                trimmed.get(1..end),
+                trimmed.get(end + 1..).unwrap_or_default(),
+            ),
             None => {
                 let end = memchr::memchr(separator, rest.as_bytes()).unwrap_or(rest.len());
                 (rest.get(..end), rest.get(end..).unwrap_or_default())
@@ -205,7 +251,9 @@ mod tests {
 
     #[test]
     fn missing_values_have_many_names() {
-        for cell in ["", "NaN", "NA", "N/A", "#N/A", "null", "-", "-1.#IND", "#VALUE!"] {
+        for cell in [
+            "", "NaN", "NA", "N/A", "#N/A", "null", "-", "-1.#IND", "#VALUE!",
+        ] {
             assert!(is_missing(cell), "{cell}");
         }
         for cell in ["0", "-1", "inf", "MAN", "1e5", "abc"] {
@@ -220,7 +268,10 @@ mod tests {
             fields(line, separator, &mut found);
             found
         };
-        assert_eq!(of("\"0,5\", 'a, b' ,\"c \"\"d\"\"\",", b','), ["0,5", "a, b", "c \"\"d\"\"", ""]);
+        assert_eq!(
+            of("\"0,5\", 'a, b' ,\"c \"\"d\"\"\",", b','),
+            ["0,5", "a, b", "c \"\"d\"\"", ""]
+        );
         assert_eq!(of("'n pump,1", b','), ["'n pump", "1"]);
         assert_eq!(of("  0.1   \"2\" -3 ", b' '), ["0.1", "2", "-3"]);
         assert_eq!(of("1;;2;", b';'), ["1", "", "2", ""]);

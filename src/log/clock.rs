@@ -60,7 +60,11 @@ pub(super) struct Rows<'a> {
 }
 
 /// Places the rows on a grid; with `resample`, only orders them and cuts them at gaps.
-pub(super) fn lay(rows: &Rows<'_>, policy: Missing, resample: Option<f64>) -> Result<Grid, LogError> {
+pub(super) fn lay(
+    rows: &Rows<'_>,
+    policy: Missing,
+    resample: Option<f64>,
+) -> Result<Grid, LogError> {
     let mut said = Vec::new();
     let mut kept: Vec<(usize, f64)> = rows
         .stamps
@@ -72,14 +76,21 @@ pub(super) fn lay(rows: &Rows<'_>, policy: Missing, resample: Option<f64>) -> Re
     let unstamped = rows.stamps.len() - kept.len();
     if unstamped > 0 {
         if policy == Missing::Error {
-            let row = rows.stamps.iter().position(|stamp| !stamp.is_finite()).unwrap_or(0);
+            let row = rows
+                .stamps
+                .iter()
+                .position(|stamp| !stamp.is_finite())
+                .unwrap_or(0);
             return Err(LogError::EmptyCell {
                 name: rows.name.to_owned(),
                 line: rows.line(row),
                 column: rows.column.to_owned(),
             });
         }
-        said.push(format!("{} without a time stamp left out", counted(unstamped, "row")));
+        said.push(format!(
+            "{} without a time stamp left out",
+            counted(unstamped, "row")
+        ));
     }
     if kept.len() < 2 {
         return Err(rows.too_short(kept.len()));
@@ -95,14 +106,22 @@ pub(super) fn lay(rows: &Rows<'_>, policy: Missing, resample: Option<f64>) -> Re
         let longest = (BRIDGED as f64 + 1.0 + JITTER) * rough.max(wanted);
         let pieces = runs
             .into_iter()
-            .flat_map(|run| cut_where(run, |before, after| policy != Missing::Interpolate && after - before > longest))
+            .flat_map(|run| {
+                cut_where(run, |before, after| {
+                    policy != Missing::Interpolate && after - before > longest
+                })
+            })
             .map(|run| Piece {
                 samples: Vec::new(),
                 times: run.iter().map(|(_, time)| *time).collect(),
                 rows: run.into_iter().map(|(row, _)| row).collect(),
             })
             .collect();
-        return Ok(Grid { pieces, step: rough, said });
+        return Ok(Grid {
+            pieces,
+            step: rough,
+            said,
+        });
     }
     let bridged = |policy: Missing| match policy {
         Missing::Auto => BRIDGED,
@@ -110,16 +129,38 @@ pub(super) fn lay(rows: &Rows<'_>, policy: Missing, resample: Option<f64>) -> Re
         Missing::Interpolate => usize::MAX,
     };
     // The step first, from rows that follow each other closely; then the rows with gaps, for which the step must be right.
-    let close: Vec<Piece> = runs.iter().flat_map(|run| place(run, rough, BRIDGED)).collect();
+    let close: Vec<Piece> = runs
+        .iter()
+        .flat_map(|run| place(run, rough, BRIDGED))
+        .collect();
     let (step, certain) = fitted_step(&close).unwrap_or((rough, 0.0));
-    let pieces: Vec<Piece> = runs.iter().flat_map(|run| place(run, step, bridged(policy))).collect();
+    let pieces: Vec<Piece> = runs
+        .iter()
+        .flat_map(|run| place(run, step, bridged(policy)))
+        .collect();
     check_grid(rows, &pieces, step, policy)?;
-    let length = pieces.iter().filter_map(|p| Some(p.times.last()? - p.times.first()?)).fold(0.0, f64::max);
-    let samples = pieces.iter().filter_map(|p| p.samples.last()).max().copied().unwrap_or(1).max(1) as f64;
-    let largest = rows.stamps.iter().copied().filter(|s| s.is_finite()).fold(length, |m, s| m.max(s.abs()));
+    let length = pieces
+        .iter()
+        .filter_map(|p| Some(p.times.last()? - p.times.first()?))
+        .fold(0.0, f64::max);
+    let samples = pieces
+        .iter()
+        .filter_map(|p| p.samples.last())
+        .max()
+        .copied()
+        .unwrap_or(1)
+        .max(1) as f64;
+    let largest = rows
+        .stamps
+        .iter()
+        .copied()
+        .filter(|s| s.is_finite())
+        .fold(length, |m, s| m.max(s.abs()));
     let slack = (4.0 * f64::EPSILON * largest + 2.0 * rows.rounding) / samples;
     let step = shortest_within(step, slack.max(3.0 * certain));
-    if let Some(jitter) = worst_jitter(&pieces, step) && jitter > STEP_TOLERANCE + 4.0 * rows.rounding / step {
+    if let Some(jitter) = worst_jitter(&pieces, step)
+        && jitter > STEP_TOLERANCE + 4.0 * rows.rounding / step
+    {
         said.push(format!(
             "time stamps off by up to {:.0} % of a sample: placed on a grid of {} s, their mean spacing",
             100.0 * jitter,
@@ -162,15 +203,21 @@ pub(super) fn counted(count: usize, noun: &str) -> String {
 
 /// The mean of the steps within half of their median.
 fn typical_step(rows: &[(usize, f64)]) -> Option<f64> {
-    let mut steps: Vec<f64> =
-        rows.windows(2).map(|w| w[1].1 - w[0].1).filter(|step| *step > 0.0).collect();
+    let mut steps: Vec<f64> = rows
+        .windows(2)
+        .map(|w| w[1].1 - w[0].1)
+        .filter(|step| *step > 0.0)
+        .collect();
     if steps.is_empty() {
         return None;
     }
     let middle = steps.len() / 2;
     let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
     let median = *median;
-    let near: Vec<f64> = steps.into_iter().filter(|s| (s / median - 1.0).abs() < 0.5).collect();
+    let near: Vec<f64> = steps
+        .into_iter()
+        .filter(|s| (s / median - 1.0).abs() < 0.5)
+        .collect();
     Some(near.iter().sum::<f64>() / near.len() as f64)
 }
 
@@ -183,7 +230,10 @@ fn spread_coarse(rows: &Rows<'_>, kept: &mut [(usize, f64)]) -> Result<Option<St
     }
     let groups: Vec<&[(usize, f64)]> = kept.chunk_by(|a, b| a.1 == b.1).collect();
     let first_row = kept.first().map_or(0, |(row, _)| *row);
-    let Some(inner) = groups.get(1..groups.len().saturating_sub(1)).filter(|g| !g.is_empty()) else {
+    let Some(inner) = groups
+        .get(1..groups.len().saturating_sub(1))
+        .filter(|g| !g.is_empty())
+    else {
         return Err(rows.not_increasing(kept[0].1, first_row + 1, kept[0].1));
     };
     let stamp = |group: &[(usize, f64)]| group.first().map_or(f64::NAN, |(_, time)| *time);
@@ -191,11 +241,18 @@ fn spread_coarse(rows: &Rows<'_>, kept: &mut [(usize, f64)]) -> Result<Option<St
         let row = pair[1].first().map_or(0, |(row, _)| *row);
         return Err(rows.not_increasing(stamp(pair[0]), row, stamp(pair[1])));
     }
-    let (least, most) = inner.iter().fold((usize::MAX, 0), |(a, b), g| (a.min(g.len()), b.max(g.len())));
-    let mut steps: Vec<f64> = groups.windows(2).map(|w| stamp(w[1]) - stamp(w[0])).collect();
+    let (least, most) = inner.iter().fold((usize::MAX, 0), |(a, b), g| {
+        (a.min(g.len()), b.max(g.len()))
+    });
+    let mut steps: Vec<f64> = groups
+        .windows(2)
+        .map(|w| stamp(w[1]) - stamp(w[0]))
+        .collect();
     steps.sort_by(f64::total_cmp);
     let resolution = steps.get(steps.len() / 2).copied().unwrap_or(f64::NAN);
-    let even = steps.iter().all(|step| (step / resolution - 1.0).abs() < STEP_TOLERANCE);
+    let even = steps
+        .iter()
+        .all(|step| (step / resolution - 1.0).abs() < STEP_TOLERANCE);
     if most - least > 1 || !even {
         return Err(LogError::CoarseStamps {
             name: rows.name.to_owned(),
@@ -213,7 +270,11 @@ fn spread_coarse(rows: &Rows<'_>, kept: &mut [(usize, f64)]) -> Result<Option<St
     for (index, row) in kept.iter_mut().enumerate() {
         row.1 = origin + (index as f64 - skipped) * step;
     }
-    let many = if least == most { most.to_string() } else { format!("{least} or {most}") };
+    let many = if least == most {
+        most.to_string()
+    } else {
+        format!("{least} or {most}")
+    };
     Ok(Some(format!(
         "time stamps only to {} s, each shared by {many} rows: the rows are spread evenly, {} s apart",
         readable(resolution),
@@ -228,7 +289,9 @@ fn repair(
     policy: Missing,
     said: &mut Vec<String>,
 ) -> Result<(), LogError> {
-    let Some(step) = typical_step(kept) else { return Err(rows.not_increasing(kept[0].1, kept[1].0, kept[1].1)) };
+    let Some(step) = typical_step(kept) else {
+        return Err(rows.not_increasing(kept[0].1, kept[1].0, kept[1].1));
+    };
     if policy == Missing::Error {
         return match kept.windows(2).find(|w| w[1].1 <= w[0].1) {
             Some(w) => Err(rows.not_increasing(w[0].1, w[1].0, w[1].1)),
@@ -243,7 +306,10 @@ fn repair(
         !again
     });
     if kept.len() < before {
-        said.push(format!("{} written twice: the second dropped", counted(before - kept.len(), "row")));
+        said.push(format!(
+            "{} written twice: the second dropped",
+            counted(before - kept.len(), "row")
+        ));
     }
     let near = |found: f64, steps: f64| (found - steps * step).abs() < 0.5 * step;
     let (mut repaired, mut conflicts) = (Vec::new(), Vec::new());
@@ -255,11 +321,19 @@ fn repair(
             let count = run as f64;
             let previous = at.checked_sub(1).map(|p| kept[p].1);
             let next = kept.get(at + run).map(|row| row.1);
-            let forward = next.map_or(previous.is_some_and(|p| near(time - p, 1.0)), |next| near(next - time, count));
-            let backward = previous.map_or(next.is_some_and(|n| near(n - time, 1.0)), |p| near(time - p, count));
+            let forward = next.map_or(previous.is_some_and(|p| near(time - p, 1.0)), |next| {
+                near(next - time, count)
+            });
+            let backward = previous.map_or(next.is_some_and(|n| near(n - time, 1.0)), |p| {
+                near(time - p, count)
+            });
             if forward || backward {
                 for (k, row) in kept[at..at + run].iter_mut().enumerate() {
-                    let shift = if forward { k as f64 } else { k as f64 - (count - 1.0) };
+                    let shift = if forward {
+                        k as f64
+                    } else {
+                        k as f64 - (count - 1.0)
+                    };
                     row.1 = time + shift * step;
                 }
                 repaired.extend(kept[at..at + run].iter().skip(1).map(|row| row.0));
@@ -324,13 +398,19 @@ fn cut_at_resets(
     policy: Missing,
     said: &mut Vec<String>,
 ) -> Result<Vec<Run>, LogError> {
-    let resets: Vec<(f64, usize, f64)> =
-        kept.windows(2).filter(|w| w[1].1 <= w[0].1).map(|w| (w[0].1, w[1].0, w[1].1)).collect();
-    let Some((before, row, after)) = resets.first().copied() else { return Ok(vec![kept]) };
+    let resets: Vec<(f64, usize, f64)> = kept
+        .windows(2)
+        .filter(|w| w[1].1 <= w[0].1)
+        .map(|w| (w[0].1, w[1].0, w[1].1))
+        .collect();
+    let Some((before, row, after)) = resets.first().copied() else {
+        return Ok(vec![kept]);
+    };
     let count = kept.len();
     let runs = cut_where(kept, |before, after| after <= before);
     // Rows that are not sorted go back all the time.
-    let unsorted = resets.len() as f64 > CONFLICTS * count as f64 || runs.iter().any(|run| run.len() < 2);
+    let unsorted =
+        resets.len() as f64 > CONFLICTS * count as f64 || runs.iter().any(|run| run.len() < 2);
     if policy == Missing::Error || unsorted {
         return Err(rows.not_increasing(before, row, after));
     }
@@ -425,23 +505,47 @@ fn distances(piece: &Piece, step: f64) -> Vec<f64> {
 }
 
 fn worst_jitter(pieces: &[Piece], step: f64) -> Option<f64> {
-    pieces.iter().flat_map(|piece| distances(piece, step)).map(f64::abs).max_by(f64::total_cmp)
+    pieces
+        .iter()
+        .flat_map(|piece| distances(piece, step))
+        .map(f64::abs)
+        .max_by(f64::total_cmp)
 }
 
 /// Refuses gaps that are not to be, stamps without a grid, and a clock that runs away from it.
-fn check_grid(rows: &Rows<'_>, pieces: &[Piece], step: f64, policy: Missing) -> Result<(), LogError> {
+fn check_grid(
+    rows: &Rows<'_>,
+    pieces: &[Piece],
+    step: f64,
+    policy: Missing,
+) -> Result<(), LogError> {
     let (name, column) = (rows.name.to_owned(), rows.column.to_owned());
     let line = |piece: &Piece, at: usize| rows.line(piece.rows.get(at).copied().unwrap_or(0));
     if policy == Missing::Error
         && let [first, second, ..] = pieces
     {
-        let found = second.times.first().zip(first.times.last()).map_or(f64::NAN, |(b, a)| b - a);
+        let found = second
+            .times
+            .first()
+            .zip(first.times.last())
+            .map_or(f64::NAN, |(b, a)| b - a);
         let (found, expected) = (readable(found), readable(step));
         let recipe = "`--missing split` does".to_owned();
-        return Err(LogError::TimeGap { name, line: line(second, 0), column, found, expected, recipe });
+        return Err(LogError::TimeGap {
+            name,
+            line: line(second, 0),
+            column,
+            found,
+            expected,
+            recipe,
+        });
     }
     let irregular = |piece: &Piece, at: usize| {
-        let found = piece.times.get(at).zip(piece.times.get(at.wrapping_sub(1))).map_or(f64::NAN, |(b, a)| b - a);
+        let found = piece
+            .times
+            .get(at)
+            .zip(piece.times.get(at.wrapping_sub(1)))
+            .map_or(f64::NAN, |(b, a)| b - a);
         LogError::IrregularStep {
             name: name.clone(),
             line: line(piece, at),
@@ -459,27 +563,38 @@ fn check_grid(rows: &Rows<'_>, pieces: &[Piece], step: f64, policy: Missing) -> 
         }
         sum += off.iter().map(|d| d * d).sum::<f64>();
         count += off.len() as f64;
-        absent += piece.samples.last().map_or(0.0, |last| (last + 1 - piece.rows.len()) as f64);
+        absent += piece
+            .samples
+            .last()
+            .map_or(0.0, |last| (last + 1 - piece.rows.len()) as f64);
     }
     let sparse = policy != Missing::Interpolate && absent > SPARSE * (count + absent);
     if (sum / f64::max(count, 1.0)).sqrt() > JITTER_RMS || sparse {
         let worst = pieces.iter().flat_map(|piece| {
-            piece.times.windows(2).enumerate().map(move |(at, w)| (piece, at + 1, (w[1] - w[0]) / step))
+            piece
+                .times
+                .windows(2)
+                .enumerate()
+                .map(move |(at, w)| (piece, at + 1, (w[1] - w[0]) / step))
         });
-        let first = worst.filter(|(_, _, steps)| *steps > GAP || (steps - 1.0).abs() > JITTER_RMS).min_by_key(|w| line(w.0, w.1));
+        let first = worst
+            .filter(|(_, _, steps)| *steps > GAP || (steps - 1.0).abs() > JITTER_RMS)
+            .min_by_key(|w| line(w.0, w.1));
         if let Some((piece, at, _)) = first {
             return Err(irregular(piece, at));
         }
     }
     for piece in pieces {
-        check_drift(&piece.samples, &piece.times, step).map_err(|(at, expected)| LogError::ClockDrift {
-            name: name.clone(),
-            line: line(piece, at),
-            column: column.clone(),
-            found: readable(piece.times.get(at).copied().unwrap_or(f64::NAN)),
-            expected: readable(expected),
-            sample_time: readable(step),
-            recipe: format!("`--resample {}` does", readable(step)).into_boxed_str(),
+        check_drift(&piece.samples, &piece.times, step).map_err(|(at, expected)| {
+            LogError::ClockDrift {
+                name: name.clone(),
+                line: line(piece, at),
+                column: column.clone(),
+                found: readable(piece.times.get(at).copied().unwrap_or(f64::NAN)),
+                expected: readable(expected),
+                sample_time: readable(step),
+                recipe: format!("`--resample {}` does", readable(step)).into_boxed_str(),
+            }
         })?;
     }
     Ok(())

@@ -33,7 +33,10 @@ pub(super) fn decode<'a>(
     if encoding != UTF_8 {
         let (text, _, broken) = encoding.decode(bytes);
         if broken || text.contains('\0') {
-            return Err(not_text(1, "it looks like UTF-16 and is not whole; export the recording as CSV"));
+            return Err(not_text(
+                1,
+                "it looks like UTF-16 and is not whole; export the recording as CSV",
+            ));
         }
         return Ok((text, Some("UTF-16")));
     }
@@ -52,7 +55,10 @@ pub(super) fn decode<'a>(
     let odd = |c: char| c.is_control() && !matches!(c, '\t' | '\n' | '\r' | '\u{c}' | '\u{1a}');
     if let Some(at) = text.find(odd) {
         let line = 1 + text.get(..at).map_or(0, |head| head.matches('\n').count()) as u64;
-        return Err(not_text(line, "it holds control characters; export the recording as CSV"));
+        return Err(not_text(
+            line,
+            "it holds control characters; export the recording as CSV",
+        ));
     }
     Ok((text, Some("Windows-1252")))
 }
@@ -61,7 +67,13 @@ pub(super) fn decode<'a>(
 fn utf_16_without_mark(bytes: &[u8]) -> Option<&'static Encoding> {
     let head = bytes.get(..bytes.len().min(LOOKED_AT) & !1)?;
     let pairs = head.len() / 2;
-    let nuls = |odd: usize| head.iter().skip(odd).step_by(2).filter(|b| **b == 0).count();
+    let nuls = |odd: usize| {
+        head.iter()
+            .skip(odd)
+            .step_by(2)
+            .filter(|b| **b == 0)
+            .count()
+    };
     if pairs < 8 {
         return None;
     }
@@ -79,7 +91,8 @@ mod tests {
     #[test]
     fn text_is_the_same_in_every_encoding() {
         let text = "Zeit;Temp [°C]\n0;1,5\n1;2,5\n";
-        let utf_16 = |bytes: fn(u16) -> [u8; 2]| text.encode_utf16().flat_map(bytes).collect::<Vec<u8>>();
+        let utf_16 =
+            |bytes: fn(u16) -> [u8; 2]| text.encode_utf16().flat_map(bytes).collect::<Vec<u8>>();
         let (little, big) = (utf_16(u16::to_le_bytes), utf_16(u16::to_be_bytes));
         let (windows, _, _) = WINDOWS_1252.encode(text);
         for bytes in [

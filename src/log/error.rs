@@ -424,8 +424,12 @@ impl LogError {
     }
 
     /// Whether another way of reading the same bytes may understand them.
-    pub(super) fn is_of_content(&self) -> bool {
-        !self.is_of_system() && !matches!(self, Self::BrokenGzip { .. } | Self::InvalidSampleTime { .. })
+    pub(crate) fn is_of_content(&self) -> bool {
+        !self.is_of_system()
+            && !matches!(
+                self,
+                Self::BrokenGzip { .. } | Self::InvalidSampleTime { .. }
+            )
     }
 
     /// Whether the reader of our standard output has gone (`innovant ... | head`): success for a command line.

@@ -28,7 +28,12 @@ pub(super) struct Tally {
 
 /// The rows of a piece on its grid, in parts without missing values. `columns` are those of the table, NaN where a value is
 /// missing.
-pub(super) fn fill(piece: &Piece, columns: &[Vec<f64>], policy: Missing, tally: &mut Tally) -> Vec<Filled> {
+pub(super) fn fill(
+    piece: &Piece,
+    columns: &[Vec<f64>],
+    policy: Missing,
+    tally: &mut Tally,
+) -> Vec<Filled> {
     let samples = piece.samples.last().map_or(0, |last| last + 1);
     tally.interpolated.resize(columns.len(), 0);
     let mut gridded: Vec<Vec<f64>> = columns
@@ -53,7 +58,11 @@ pub(super) fn fill(piece: &Piece, columns: &[Vec<f64>], policy: Missing, tally: 
         *count += filled;
         tally.longest = tally.longest.max(longest);
     }
-    let whole = |k: usize| gridded.iter().all(|column| column.get(k).is_some_and(|v| v.is_finite()));
+    let whole = |k: usize| {
+        gridded
+            .iter()
+            .all(|column| column.get(k).is_some_and(|v| v.is_finite()))
+    };
     let mut parts = Vec::new();
     let mut from = 0;
     while from < samples {
@@ -66,7 +75,10 @@ pub(super) fn fill(piece: &Piece, columns: &[Vec<f64>], policy: Missing, tally: 
         if to - from < SHORTEST && to - from < samples {
             tally.left_out += to - from;
         } else {
-            let columns = gridded.iter().map(|c| c.get(from..to).unwrap_or_default().to_vec()).collect();
+            let columns = gridded
+                .iter()
+                .map(|c| c.get(from..to).unwrap_or_default().to_vec())
+                .collect();
             parts.push(Filled { from, columns });
         }
         from = to;
@@ -106,7 +118,11 @@ mod tests {
     const GONE: f64 = f64::NAN;
 
     fn piece(samples: usize) -> Piece {
-        Piece { rows: (0..samples).collect(), samples: (0..samples).collect(), times: Vec::new() }
+        Piece {
+            rows: (0..samples).collect(),
+            samples: (0..samples).collect(),
+            times: Vec::new(),
+        }
     }
 
     #[test]
@@ -117,15 +133,39 @@ mod tests {
         }
         let mut tally = Tally::default();
         let parts = fill(&piece(100), &[column.clone()], Missing::Auto, &mut tally);
-        assert_eq!((tally.interpolated.clone(), tally.longest, tally.left_out), (vec![3], 2, 5));
-        assert_eq!(parts.iter().map(|p| (p.from, p.columns[0].len())).collect::<Vec<_>>(), [(1, 49), (53, 46)]);
+        assert_eq!(
+            (tally.interpolated.clone(), tally.longest, tally.left_out),
+            (vec![3], 2, 5)
+        );
+        assert_eq!(
+            parts
+                .iter()
+                .map(|p| (p.from, p.columns[0].len()))
+                .collect::<Vec<_>>(),
+            [(1, 49), (53, 46)]
+        );
         for part in &parts {
-            assert!(part.columns[0].iter().enumerate().all(|(k, v)| (v - (part.from + k) as f64).abs() < 1e-12));
+            assert!(
+                part.columns[0]
+                    .iter()
+                    .enumerate()
+                    .all(|(k, v)| (v - (part.from + k) as f64).abs() < 1e-12)
+            );
         }
         let mut tally = Tally::default();
-        let parts = fill(&piece(100), &[column.clone()], Missing::Interpolate, &mut tally);
+        let parts = fill(
+            &piece(100),
+            &[column.clone()],
+            Missing::Interpolate,
+            &mut tally,
+        );
         assert_eq!((parts.len(), tally.longest, tally.left_out), (1, 3, 2));
-        let parts = fill(&piece(100), &[column], Missing::Split, &mut Tally::default());
+        let parts = fill(
+            &piece(100),
+            &[column],
+            Missing::Split,
+            &mut Tally::default(),
+        );
         assert_eq!(parts.iter().map(|p| p.from).collect::<Vec<_>>(), [22, 53]);
     }
 }

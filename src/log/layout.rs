@@ -27,8 +27,6 @@ pub(super) struct Layout {
     pub(super) header: Header,
     /// Index of the first line of data.
     pub(super) data: usize,
-    /// Which columns hold numbers or stamps.
-    pub(super) numeric: Vec<bool>,
     /// What is to be said.
     pub(super) said: Vec<String>,
 }
@@ -40,7 +38,10 @@ pub(super) fn lines(text: &str) -> Vec<&str> {
         .split(end)
         .map(|line| line.strip_suffix('\r').unwrap_or(line))
         .collect();
-    if lines.last().is_some_and(|line| line.trim().is_empty() || *line == "\u{1a}") {
+    if lines
+        .last()
+        .is_some_and(|line| line.trim().is_empty() || *line == "\u{1a}")
+    {
         lines.pop();
     }
     lines
@@ -50,7 +51,9 @@ pub(super) fn lines(text: &str) -> Vec<&str> {
 pub(super) fn find(name: &str, lines: &[&str], roles: &Roles) -> Option<Layout> {
     let mut said = Vec::new();
     // Excel's own remark on the separator.
-    let excel = lines.first().and_then(|line| line.trim_matches('"').trim().strip_prefix("sep="));
+    let excel = lines
+        .first()
+        .and_then(|line| line.trim_matches('"').trim().strip_prefix("sep="));
     let from = usize::from(excel.is_some());
     let sample = sample(lines, from);
     let (separator, count) = separator(&sample, excel)?;
@@ -83,18 +86,32 @@ pub(super) fn find(name: &str, lines: &[&str], roles: &Roles) -> Option<Layout> 
     };
     let data = (from..lines.len().min(LONGEST_PREAMBLE + from)).find(|index| {
         let at = |index: usize| lines.get(index).copied().unwrap_or_default();
-        let next = lines.iter().skip(index + 1).find(|line| !line.trim().is_empty());
+        let next = lines
+            .iter()
+            .skip(index + 1)
+            .find(|line| !line.trim().is_empty());
         is_data(at(*index)) && next.is_none_or(|next| is_data(next))
     })?;
     let (at, units) = header_row(lines, from, data, separator, count, roles);
-    let bare = |line: &str| line.trim_start().trim_start_matches(['#', '%']).trim_start().to_owned();
+    let bare = |line: &str| {
+        line.trim_start()
+            .trim_start_matches(['#', '%'])
+            .trim_start()
+            .to_owned()
+    };
     let header_line = at.and_then(|at| lines.get(at)).map(|line| bare(line));
     let mut raw: Vec<String> = match &header_line {
-        Some(line) => cut(line, separator).iter().map(|f| f.replace("\"\"", "\"")).collect(),
+        Some(line) => cut(line, separator)
+            .iter()
+            .map(|f| f.replace("\"\"", "\""))
+            .collect(),
         None => (1..=count).map(|column| column.to_string()).collect(),
     };
     // A separator at the end of each line makes a column of nothing.
-    while raw.len() > 1 && raw.last().is_some_and(String::is_empty) && !numeric.get(raw.len() - 1).copied().unwrap_or(false) {
+    while raw.len() > 1
+        && raw.last().is_some_and(String::is_empty)
+        && !numeric.get(raw.len() - 1).copied().unwrap_or(false)
+    {
         raw.pop();
     }
     let mut channels: Vec<Channel> = match at {
@@ -112,9 +129,15 @@ pub(super) fn find(name: &str, lines: &[&str], roles: &Roles) -> Option<Layout> 
         said.push(format!("units in line {}", units.map_or(0, |at| at + 1)));
     }
     let above = lines.get(from..at.unwrap_or(data)).unwrap_or_default();
-    let above = above.iter().filter(|line| !line.trim().is_empty() && !line.starts_with('#')).count();
+    let above = above
+        .iter()
+        .filter(|line| !line.trim().is_empty() && !line.starts_with('#'))
+        .count();
     if above > 0 {
-        said.push(format!("{above} {} of text above the header", if above == 1 { "line" } else { "lines" }));
+        said.push(format!(
+            "{above} {} of text above the header",
+            if above == 1 { "line" } else { "lines" }
+        ));
     }
     if at.is_none() {
         said.push("no header: columns go by number".to_owned());
@@ -127,7 +150,7 @@ pub(super) fn find(name: &str, lines: &[&str], roles: &Roles) -> Option<Layout> 
         headerless: at.is_none(),
         line: at.unwrap_or(data) as u64 + 1,
     };
-    Some(Layout { header, data, numeric, said })
+    Some(Layout { header, data, said })
 }
 
 /// A line cut into its fields.
@@ -143,7 +166,12 @@ fn is_value(cell: &str) -> bool {
 
 /// Lines spread over the last two thirds, where no header is.
 fn sample<'a>(lines: &[&'a str], from: usize) -> Vec<&'a str> {
-    let lines: Vec<&str> = lines.iter().skip(from).copied().filter(|line| !line.trim().is_empty()).collect();
+    let lines: Vec<&str> = lines
+        .iter()
+        .skip(from)
+        .copied()
+        .filter(|line| !line.trim().is_empty())
+        .collect();
     let tail = lines.get(lines.len() / 3..).unwrap_or_default();
     let stride = (tail.len() / LOOKED_AT).max(1);
     tail.iter().copied().step_by(stride).collect()
@@ -151,7 +179,9 @@ fn sample<'a>(lines: &[&'a str], from: usize) -> Vec<&'a str> {
 
 /// The separator of the rows, and how many fields most of them have.
 fn separator(sample: &[&str], excel: Option<&str>) -> Option<(u8, usize)> {
-    let named = excel.and_then(|text| text.bytes().next()).filter(u8::is_ascii);
+    let named = excel
+        .and_then(|text| text.bytes().next())
+        .filter(u8::is_ascii);
     let candidates: &[u8] = match &named {
         Some(b) => std::slice::from_ref(b),
         None => b";\t,| ",
@@ -161,17 +191,27 @@ fn separator(sample: &[&str], excel: Option<&str>) -> Option<(u8, usize)> {
         let rows: Vec<Vec<&str>> = sample.iter().map(|line| cut(line, candidate)).collect();
         let mut counts: Vec<usize> = rows.iter().map(Vec::len).collect();
         counts.sort_unstable();
-        let Some(count) = mode(&counts).filter(|count| *count > 1) else { continue };
+        let Some(count) = mode(&counts).filter(|count| *count > 1) else {
+            continue;
+        };
         let alike: Vec<&Vec<&str>> = rows.iter().filter(|row| row.len() == count).collect();
         let share = alike.len() as f64 / rows.len() as f64;
-        let cells = || alike.iter().flat_map(|row| row.iter()).filter(|cell| !cell.is_empty());
-        let values = cells().filter(|cell| is_value(cell) || is_missing(cell)).count() as f64;
+        let cells = || {
+            alike
+                .iter()
+                .flat_map(|row| row.iter())
+                .filter(|cell| !cell.is_empty())
+        };
+        let values = cells()
+            .filter(|cell| is_value(cell) || is_missing(cell))
+            .count() as f64;
         let score = share * values / cells().count().max(1) as f64;
         if share >= ALIKE && best.is_none_or(|(most, _, _)| score > most) {
             best = Some((score, candidate, count));
         }
     }
-    best.filter(|(score, _, _)| *score > 0.0).map(|(_, separator, count)| (separator, count))
+    best.filter(|(score, _, _)| *score > 0.0)
+        .map(|(_, separator, count)| (separator, count))
 }
 
 /// The most frequent of sorted numbers.
@@ -193,7 +233,9 @@ fn header_row(
 ) -> (Option<usize>, Option<usize>) {
     let bare = |index: usize| {
         let line = lines.get(index).copied().unwrap_or_default();
-        line.trim_start().trim_start_matches(['#', '%']).trim_start()
+        line.trim_start()
+            .trim_start_matches(['#', '%'])
+            .trim_start()
     };
     let fits = |index: &usize| {
         let row = cut(bare(*index), separator);
@@ -213,10 +255,20 @@ fn header_row(
         .map(|name| Channel::parse(name))
         .collect();
     let found = |index: usize| {
-        let row: Vec<Channel> = cut(bare(index), separator).iter().map(|cell| Channel::parse(cell)).collect();
-        asked.iter().filter(|asked| row.iter().any(|channel| channel.answers_to(asked, true))).count()
+        let row: Vec<Channel> = cut(bare(index), separator)
+            .iter()
+            .map(|cell| Channel::parse(cell))
+            .collect();
+        asked
+            .iter()
+            .filter(|asked| row.iter().any(|channel| channel.answers_to(asked, true)))
+            .count()
     };
-    let by_name = above.iter().copied().max_by_key(|index| found(*index)).filter(|index| found(*index) > 0);
+    let by_name = above
+        .iter()
+        .copied()
+        .max_by_key(|index| found(*index))
+        .filter(|index| found(*index) > 0);
     let units_like = |index: usize| {
         let row = cut(bare(index), separator);
         let short = |cell: &&str| cell.chars().count() <= LONGEST_UNIT;
@@ -228,7 +280,11 @@ fn header_row(
         (last, _) => last,
     });
     let units = header.and_then(|header| {
-        above.iter().copied().filter(|index| *index > header).find(|index| units_like(*index))
+        above
+            .iter()
+            .copied()
+            .filter(|index| *index > header)
+            .find(|index| units_like(*index))
     });
     (header, units)
 }

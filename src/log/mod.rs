@@ -91,5 +91,6 @@ pub use record::{LARGEST_SIZE, Log};
 pub use roles::{Missing, RoleNeed, Roles, TimeUnit};
 pub use sampling::is_sample_time;
 pub use source::Source;
+pub use stamps::Origin;
 pub use table::{TableRoles, time_base_of};
 pub use writer::{CsvWriter, write_table};

@@ -3,8 +3,6 @@
 
 use std::io::{Cursor, Read};
 
-use sha2::{Digest, Sha256};
-
 use super::clock::{self, Piece, Rows, counted};
 use super::error::LogError;
 use super::fill::{Filled, Tally, fill};
@@ -14,7 +12,7 @@ use super::resample::Resampling;
 use super::roles::{Missing, RoleNeed, Roles};
 use super::sampling::readable;
 use super::source::{Source, Stream};
-use super::stamps::check_sample_time;
+use super::stamps::{Origin, check_sample_time};
 use super::whole::{self, Whole};
 use crate::limits;
 
@@ -29,7 +27,7 @@ pub struct Reading {
     /// Recordings without gaps, one unless samples are missing; all of one sample time.
     pub logs: Vec<Log>,
     /// Date and time at second zero, when the time column has dates.
-    pub origin: Option<String>,
+    pub origin: Option<Origin>,
     /// What was recognised and repaired, on one line; nothing of a plain file.
     pub said: Option<String>,
 }
@@ -49,7 +47,11 @@ impl Reading {
                 Err(error) if !error.is_of_content() => return Err(error),
                 Err(error) if !source.can_be_reopened() => {
                     // Its dates or repairs cannot be looked at again.
-                    return Err(if matches!(error, LogError::Dated { .. }) { LogError::ReadOnce { name } } else { error });
+                    return Err(if matches!(error, LogError::Dated { .. }) {
+                        LogError::ReadOnce { name }
+                    } else {
+                        error
+                    });
                 }
                 Err(error) => Some(error),
             }
@@ -67,7 +69,10 @@ impl Reading {
         roles: &Roles,
         need: RoleNeed,
     ) -> Result<Self, LogError> {
-        let open = |source| LogError::Open { name: name.to_owned(), source };
+        let open = |source| LogError::Open {
+            name: name.to_owned(),
+            source,
+        };
         let mut bytes = Vec::new();
         reader.read_to_end(&mut bytes).map_err(open)?;
         let plain = if roles.resample.is_some() {
@@ -100,7 +105,11 @@ impl Reading {
     }
 
     fn of_plain(log: Log) -> Self {
-        Self { logs: vec![log], origin: None, said: None }
+        Self {
+            logs: vec![log],
+            origin: None,
+            said: None,
+        }
     }
 
     /// `plain` is what the plain reader said of these bytes.
@@ -111,26 +120,50 @@ impl Reading {
         need: RoleNeed,
         plain: Option<LogError>,
     ) -> Result<Self, LogError> {
-        if let Some(sample_time) = roles.resample.filter(|step| !super::sampling::is_sample_time(*step)) {
+        if let Some(sample_time) = roles
+            .resample
+            .filter(|step| !super::sampling::is_sample_time(*step))
+        {
             return Err(LogError::InvalidSampleTime { sample_time });
         }
         let mut bytes = Vec::new();
         if let Some(size) = stream.bytes_total() {
             check_memory(name, size as usize)?;
         }
-        stream.read_to_end(&mut bytes).map_err(|source| LogError::Read { name: name.to_owned(), line: 0, source })?;
+        stream
+            .read_to_end(&mut bytes)
+            .map_err(|source| LogError::Read {
+                name: name.to_owned(),
+                line: 0,
+                source,
+            })?;
         check_memory(name, bytes.len())?;
         let (sha256, _) = stream.into_digest();
-        let unread = |plain: Option<LogError>| plain.unwrap_or_else(|| LogError::Empty { name: name.to_owned() });
+        let unread = |plain: Option<LogError>| {
+            plain.unwrap_or_else(|| LogError::Empty {
+                name: name.to_owned(),
+            })
+        };
         let (text, encoding) = whole::text(name, &bytes)?;
-        let Some(table) = Whole::read(name, &text, roles, need)? else { return Err(unread(plain)) };
-        let mut said: Vec<String> = encoding.iter().map(|encoding| format!("read as {encoding}")).collect();
+        let Some(table) = Whole::read(name, &text, roles, need)? else {
+            return Err(unread(plain));
+        };
+        let mut said: Vec<String> = encoding
+            .iter()
+            .map(|encoding| format!("read as {encoding}"))
+            .collect();
         said.extend(table.layout.said.iter().cloned());
         said.extend(table.said.iter().cloned());
-        let assembled = Assembly { name, table: &table, roles, sha256: &sha256 }.logs(&mut said)?;
+        let assembled = Assembly {
+            name,
+            table: &table,
+            roles,
+            sha256: &sha256,
+        }
+        .logs(&mut said)?;
         Ok(Self {
             logs: assembled,
-            origin: table.stamps.as_ref().and_then(|stamps| stamps.origin.clone()),
+            origin: table.stamps.as_ref().and_then(|stamps| stamps.origin),
             said: (!said.is_empty()).then(|| said.join("; ")),
         })
     }
@@ -141,7 +174,9 @@ fn check_memory(name: &str, bytes: usize) -> Result<(), LogError> {
         (bytes as u64).saturating_mul(COPIES as u64),
         None,
         || format!("{name}: {bytes} bytes that are not plain CSV"),
-        || "take a part of the recording, or convert it to commas, points and seconds, which are streamed".to_owned(),
+        || {
+            "take a part of the recording, or convert it to commas, points and seconds, which are streamed".to_owned()
+        },
     )?;
     Ok(())
 }
@@ -170,7 +205,8 @@ impl Assembly<'_> {
             (None, Some((index, stamps))) => {
                 let column = header.column(index);
                 let same = |row: usize| {
-                    row.checked_sub(1).and_then(|before| table.rows.get(before)) == table.rows.get(row)
+                    row.checked_sub(1).and_then(|before| table.rows.get(before))
+                        == table.rows.get(row)
                 };
                 let rows = Rows {
                     name: self.name,
@@ -188,7 +224,14 @@ impl Assembly<'_> {
                 let step = given.unwrap_or(f64::NAN);
                 let all = 0..table.rows.len();
                 let times = all.clone().map(|k| k as f64 * step).collect();
-                (vec![Piece { rows: all.clone().collect(), samples: all.collect(), times }], step)
+                (
+                    vec![Piece {
+                        rows: all.clone().collect(),
+                        samples: all.collect(),
+                        times,
+                    }],
+                    step,
+                )
             }
         };
         let parts = match self.roles.resample {
@@ -197,18 +240,28 @@ impl Assembly<'_> {
         };
         if parts.is_empty() {
             let missing = said.last().cloned().unwrap_or_default();
-            return Err(LogError::NothingLeft { name: self.name.to_owned(), missing });
+            return Err(LogError::NothingLeft {
+                name: self.name.to_owned(),
+                missing,
+            });
         }
         if parts.len() > 1 {
             let each = parts.iter().map(|(start, part)| {
-                format!("{} samples from {} s", part.columns.first().map_or(0, Vec::len), readable(*start))
+                format!(
+                    "{} samples from {} s",
+                    part.columns.first().map_or(0, Vec::len),
+                    readable(*start)
+                )
             });
             const SHOWN: usize = 4;
             let mut list = each.clone().take(SHOWN).collect::<Vec<_>>().join(", ");
             if parts.len() > SHOWN {
                 list.push_str(", ...");
             }
-            said.push(format!("split where samples are missing into {} recordings: {list}", parts.len()));
+            said.push(format!(
+                "split where samples are missing into {} recordings: {list}",
+                parts.len()
+            ));
         }
         let step = self.roles.resample.unwrap_or(step);
         let logs: Vec<Log> = parts
@@ -220,16 +273,33 @@ impl Assembly<'_> {
         Ok(logs)
     }
 
-    fn log(&self, index: usize, count: usize, sample_time: f64, start_time: f64, part: &Filled) -> Log {
+    fn log(
+        &self,
+        index: usize,
+        count: usize,
+        sample_time: f64,
+        start_time: f64,
+        part: &Filled,
+    ) -> Log {
         let header = &self.table.layout.header;
         let named = |columns: &[usize]| {
-            columns.iter().filter_map(|c| header.channels.get(*c).cloned()).collect::<Vec<_>>()
+            columns
+                .iter()
+                .filter_map(|c| header.channels.get(*c).cloned())
+                .collect::<Vec<_>>()
         };
-        let (inputs, outputs) = (named(&self.table.assigned.inputs), named(&self.table.assigned.outputs));
+        let (inputs, outputs) = (
+            named(&self.table.assigned.inputs),
+            named(&self.table.assigned.outputs),
+        );
         let mut input_data = part.columns.clone();
         let output_data = input_data.split_off(inputs.len().min(input_data.len()));
         Log {
-            name: if count > 1 { format!("{} [part {} of {count}]", self.name, index + 1) } else { self.name.to_owned() },
+            name: if count > 1 {
+                format!("{} [part {} of {count}]", self.name, index + 1)
+            } else {
+                self.name.to_owned()
+            },
             sample_time,
             start_time,
             inputs,
@@ -245,10 +315,23 @@ impl Assembly<'_> {
         if self.roles.missing != Missing::Error {
             return Ok(());
         }
-        let channels = self.table.assigned.inputs.iter().chain(&self.table.assigned.outputs);
-        let gone = self.table.columns.iter().zip(channels).filter_map(|(column, index)| {
-            column.iter().position(|v| v.is_nan()).map(|row| (row, *index))
-        });
+        let channels = self
+            .table
+            .assigned
+            .inputs
+            .iter()
+            .chain(&self.table.assigned.outputs);
+        let gone = self
+            .table
+            .columns
+            .iter()
+            .zip(channels)
+            .filter_map(|(column, index)| {
+                column
+                    .iter()
+                    .position(|v| v.is_nan())
+                    .map(|row| (row, *index))
+            });
         match gone.min() {
             Some((row, index)) => Err(LogError::EmptyCell {
                 name: self.name.to_owned(),
@@ -269,9 +352,20 @@ impl Assembly<'_> {
                 parts.push((start + part.from as f64 * step, part));
             }
         }
-        let samples: usize = parts.iter().map(|(_, p)| p.columns.first().map_or(0, Vec::len)).sum();
-        for (count, name) in tally.interpolated.iter().zip(self.names()).filter(|(count, _)| **count > 0) {
-            let mut text = format!("{} of `{name}` interpolated", counted(*count, "missing value"));
+        let samples: usize = parts
+            .iter()
+            .map(|(_, p)| p.columns.first().map_or(0, Vec::len))
+            .sum();
+        for (count, name) in tally
+            .interpolated
+            .iter()
+            .zip(self.names())
+            .filter(|(count, _)| **count > 0)
+        {
+            let mut text = format!(
+                "{} of `{name}` interpolated",
+                counted(*count, "missing value")
+            );
             if *count as f64 > SLOWER * samples as f64 {
                 text.push_str(" (a column logged at a lower rate? `--resample S` at its step invents nothing)");
             }
@@ -281,17 +375,31 @@ impl Assembly<'_> {
             said.push(format!("at most {} missing in a row", tally.longest));
         }
         if tally.left_out > 0 {
-            said.push(format!("{} left out at or between missing values", counted(tally.left_out, "sample")));
+            said.push(format!(
+                "{} left out at or between missing values",
+                counted(tally.left_out, "sample")
+            ));
         }
         parts
     }
 
     fn names(&self) -> impl Iterator<Item = String> {
-        let columns = self.table.assigned.inputs.iter().chain(&self.table.assigned.outputs);
+        let columns = self
+            .table
+            .assigned
+            .inputs
+            .iter()
+            .chain(&self.table.assigned.outputs);
         columns.map(|column| self.table.layout.header.column(*column))
     }
 
-    fn resampled(&self, pieces: &[Piece], step: f64, wanted: f64, said: &mut Vec<String>) -> Vec<(f64, Filled)> {
+    fn resampled(
+        &self,
+        pieces: &[Piece],
+        step: f64,
+        wanted: f64,
+        said: &mut Vec<String>,
+    ) -> Vec<(f64, Filled)> {
         let inputs = self.table.assigned.inputs.len();
         let mut parts = Vec::new();
         for piece in pieces {
@@ -302,11 +410,19 @@ impl Assembly<'_> {
                 .iter()
                 .map(|column| {
                     let rows = piece.rows.iter().zip(&piece.times);
-                    rows.filter_map(|(row, time)| Some((*time, *column.get(*row)?))).filter(|p| p.1.is_finite()).unzip()
+                    rows.filter_map(|(row, time)| Some((*time, *column.get(*row)?)))
+                        .filter(|p| p.1.is_finite())
+                        .unzip()
                 })
                 .collect();
-            let from = known.iter().map(|k| k.0.first().copied().unwrap_or(f64::INFINITY)).fold(f64::NEG_INFINITY, f64::max);
-            let to = known.iter().map(|k| k.0.last().copied().unwrap_or(f64::NEG_INFINITY)).fold(f64::INFINITY, f64::min);
+            let from = known
+                .iter()
+                .map(|k| k.0.first().copied().unwrap_or(f64::INFINITY))
+                .fold(f64::NEG_INFINITY, f64::max);
+            let to = known
+                .iter()
+                .map(|k| k.0.last().copied().unwrap_or(f64::NEG_INFINITY))
+                .fold(f64::INFINITY, f64::min);
             if to - from < wanted {
                 continue;
             }
@@ -314,15 +430,30 @@ impl Assembly<'_> {
                 .iter()
                 .enumerate()
                 .map(|(index, (times, values))| {
-                    let own = (times.last().copied().unwrap_or(0.0) - times.first().copied().unwrap_or(0.0))
+                    let own = (times.last().copied().unwrap_or(0.0)
+                        - times.first().copied().unwrap_or(0.0))
                         / (times.len().max(2) - 1) as f64;
-                    Resampling { times, step: own, wanted, from, to }.column(values, index < inputs)
+                    Resampling {
+                        times,
+                        step: own,
+                        wanted,
+                        from,
+                        to,
+                    }
+                    .column(values, index < inputs)
                 })
                 .collect();
             parts.push((from, Filled { from: 0, columns }));
         }
-        let how = if wanted > step { "low-pass filtered and put" } else { "inputs held, outputs joined by lines, put" };
-        said.push(format!("{how} on a grid of {wanted} s from steps of about {} s", readable(step)));
+        let how = if wanted > step {
+            "low-pass filtered and put"
+        } else {
+            "inputs held, outputs joined by lines, put"
+        };
+        said.push(format!(
+            "{how} on a grid of {wanted} s from steps of about {} s",
+            readable(step)
+        ));
         parts
     }
 }
@@ -330,7 +461,15 @@ impl Assembly<'_> {
 /// Time of the first sample of a piece: its stamp, unless that is off the grid of the others.
 fn phase(piece: &Piece, step: f64) -> f64 {
     let first = piece.times.first().copied().unwrap_or(0.0);
-    let off = piece.samples.iter().zip(&piece.times).map(|(k, t)| t - first - *k as f64 * step);
+    let off = piece
+        .samples
+        .iter()
+        .zip(&piece.times)
+        .map(|(k, t)| t - first - *k as f64 * step);
     let mean = off.sum::<f64>() / piece.times.len().max(1) as f64;
-    if mean.abs() > super::sampling::STEP_TOLERANCE * step { readable(first + mean) } else { first }
+    if mean.abs() > super::sampling::STEP_TOLERANCE * step {
+        readable(first + mean)
+    } else {
+        first
+    }
 }

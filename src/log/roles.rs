@@ -392,12 +392,21 @@ fn default_time(header: &Header, taken: &[usize]) -> Option<usize> {
 /// `Time_s`, `timestamp`, `epoch_ms`, `Zeit` and the like.
 fn is_usual_time(name: &str) -> bool {
     let bare = match TimeUnit::of_name(name) {
-        Some(_) => name.rsplit_once(['_', '-', '.']).map_or(name, |(bare, _)| bare),
+        Some(_) => name
+            .rsplit_once(['_', '-', '.'])
+            .map_or(name, |(bare, _)| bare),
         None => name,
     };
-    let word: String = bare.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
+    let word: String = bare
+        .to_lowercase()
+        .chars()
+        .filter(|c| c.is_alphanumeric())
+        .collect();
     (bare != name && (word == "t" || word == "time"))
-        || matches!(word.as_str(), "timestamp" | "datetime" | "zeit" | "zeitstempel" | "epoch" | "unixtime")
+        || matches!(
+            word.as_str(),
+            "timestamp" | "datetime" | "zeit" | "zeitstempel" | "epoch" | "unixtime"
+        )
 }
 
 /// Most bytes of names in an example of what to type.

@@ -249,9 +249,17 @@ pub(super) fn check_drift(samples: &[usize], times: &[f64], step: f64) -> Result
     let (Some(first), Some(last)) = (times.first(), times.last()) else {
         return Ok(());
     };
-    let phases = || samples.iter().zip(times).map(|(k, t)| t - first - *k as f64 * step);
+    let phases = || {
+        samples
+            .iter()
+            .zip(times)
+            .map(|(k, t)| t - first - *k as f64 * step)
+    };
     let phase = phases().sum::<f64>() / times.len() as f64;
-    let worst = phases().map(|p| (p - phase).abs()).enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+    let worst = phases()
+        .map(|p| (p - phase).abs())
+        .enumerate()
+        .max_by(|a, b| a.1.total_cmp(&b.1));
     match worst {
         Some((at, off)) if off > (0.5 * step).max(DRIFT_TOLERANCE * (last - first)) => {
             let sample = samples.get(at).copied().unwrap_or(0) as f64;

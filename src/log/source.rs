@@ -44,7 +44,10 @@ impl Read for Again {
         }
         let count = io::stdin().read(buffer)?;
         if let Ok(mut head) = HEAD.lock() {
-            if head.as_ref().is_some_and(|bytes| bytes.len() + count > KEPT) {
+            if head
+                .as_ref()
+                .is_some_and(|bytes| bytes.len() + count > KEPT)
+            {
                 *head = None;
             }
             if let (Some(bytes), Some(fresh)) = (head.as_mut(), buffer.get(..count)) {
@@ -114,7 +117,7 @@ impl Source {
     }
 
     /// Whether all of it can be read from its start, once a first reading went some way.
-    pub(super) fn can_be_reopened(&self) -> bool {
+    pub(crate) fn can_be_reopened(&self) -> bool {
         match self {
             Self::Stdin => HEAD.lock().is_ok_and(|head| head.is_some()),
             Self::Path(_) => self.can_be_read_again(),

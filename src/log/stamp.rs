@@ -58,7 +58,9 @@ impl Format {
             if *dated.get_or_insert(parts.date.is_some()) != parts.date.is_some() {
                 return None;
             }
-            let Some((numbers, said)) = parts.date else { continue };
+            let Some((numbers, said)) = parts.date else {
+                continue;
+            };
             if let Some(said) = said {
                 if *order.get_or_insert(said) != said {
                     return None;
@@ -75,7 +77,10 @@ impl Format {
             return None;
         }
         if dated == Some(false) {
-            return Some(Self { order: None, ambiguous: false });
+            return Some(Self {
+                order: None,
+                ambiguous: false,
+            });
         }
         let guessed = if month_first || (!day_first && american && !dots) {
             Order::MonthDayYear
@@ -93,7 +98,9 @@ impl Format {
     pub(super) fn nanoseconds(self, cell: &str) -> Option<i128> {
         let parts = take_apart(cell)?;
         let time = parts.time.unwrap_or(0) - parts.offset.unwrap_or(0) * SECOND;
-        let Some(order) = self.order else { return Some(time) };
+        let Some(order) = self.order else {
+            return Some(time);
+        };
         let ([a, b, c], _) = parts.date?;
         let (year, month, day) = match order {
             Order::YearMonthDay => (a, b, c),
@@ -123,10 +130,13 @@ fn full_year(year: i32) -> i32 {
 /// A moment as ISO 8601, to the nanosecond where it takes that.
 pub(super) fn iso(nanoseconds: i128) -> String {
     let stamp = jiff::Timestamp::from_nanosecond(nanoseconds);
-    stamp.map_or_else(|_| format!("{nanoseconds} ns since 1970"), |stamp| {
-        let text = stamp.to_string();
-        text.strip_suffix('Z').unwrap_or(&text).replace('T', " ")
-    })
+    stamp.map_or_else(
+        |_| format!("{nanoseconds} ns since 1970"),
+        |stamp| {
+            let text = stamp.to_string();
+            text.strip_suffix('Z').unwrap_or(&text).replace('T', " ")
+        },
+    )
 }
 
 /// Reads numbers and what stands between them; `None` when this is no date or time.
@@ -139,11 +149,19 @@ fn take_apart(cell: &str) -> Option<Parts> {
     let rest = rest.trim_start_matches([' ', 'T', 't', '_', ',', '/', '-', ':']);
     if rest.is_empty() {
         // A date alone is a stamp of one sample a day.
-        return date.map(|date| Parts { date: Some(date), time: None, offset: None });
+        return date.map(|date| Parts {
+            date: Some(date),
+            time: None,
+            offset: None,
+        });
     }
     let (time, rest) = read_time(rest)?;
     let offset = read_offset(rest.trim())?;
-    Some(Parts { date, time: Some(time), offset })
+    Some(Parts {
+        date,
+        time: Some(time),
+        offset,
+    })
 }
 
 /// A date at the start: `2026-11-23`, `23.11.2026`, `11/23/2026`, `23-Nov-2026`, `20261123`.
@@ -151,28 +169,51 @@ fn read_date(cell: &str) -> (Option<([i32; 3], Option<Order>)>, &str) {
     let none = (None, cell);
     // A weekday says nothing new.
     let text = match cell.split_once([' ', ',']) {
-        Some((word, rest)) if word.len() >= 3 && word.chars().all(char::is_alphabetic) && month(word).is_none() => {
+        Some((word, rest))
+            if word.len() >= 3
+                && word.chars().all(char::is_alphabetic)
+                && month(word).is_none() =>
+        {
             rest.trim_start_matches([' ', ','])
         }
         _ => cell,
     };
-    let Some((first, after)) = number_or_month(text) else { return none };
+    let Some((first, after)) = number_or_month(text) else {
+        return none;
+    };
     // 20261123T100000: a compact date.
     if first.digits == 8 && !after.starts_with('.') {
         let value = first.value;
-        return (Some(([value / 10_000, value / 100 % 100, value % 100], Some(Order::YearMonthDay))), after);
+        return (
+            Some((
+                [value / 10_000, value / 100 % 100, value % 100],
+                Some(Order::YearMonthDay),
+            )),
+            after,
+        );
     }
     let mut rest = after;
     let mut parts = [first; 3];
     let mut separators = [' '; 2];
     for index in 1..3 {
         let mut letters = rest.chars();
-        let Some(separator) = letters.next().filter(|c| matches!(c, '-' | '/' | '.' | ' ')) else { return none };
-        if separator == ' ' && !parts.iter().any(|p| p.named) && !letters.as_str().starts_with(char::is_alphabetic) {
+        let Some(separator) = letters
+            .next()
+            .filter(|c| matches!(c, '-' | '/' | '.' | ' '))
+        else {
+            return none;
+        };
+        if separator == ' '
+            && !parts.iter().any(|p| p.named)
+            && !letters.as_str().starts_with(char::is_alphabetic)
+        {
             return none;
         }
         separators[index - 1] = separator;
-        let Some((part, after)) = number_or_month(letters.as_str().trim_start_matches([' ', '.'])) else { return none };
+        let Some((part, after)) = number_or_month(letters.as_str().trim_start_matches([' ', '.']))
+        else {
+            return none;
+        };
         parts[index] = part;
         rest = after.strip_prefix(',').unwrap_or(after);
     }
@@ -206,17 +247,32 @@ fn number_or_month(text: &str) -> Option<(Part, &str)> {
     if digits > 0 {
         let (number, rest) = text.split_at_checked(digits)?;
         let value = number.parse().ok()?;
-        return Some((Part { value, digits, named: false }, rest));
+        return Some((
+            Part {
+                value,
+                digits,
+                named: false,
+            },
+            rest,
+        ));
     }
     let letters = text.bytes().take_while(u8::is_ascii_alphabetic).count();
     let (word, rest) = text.split_at_checked(letters)?;
-    Some((Part { value: month(word)?, digits: 0, named: true }, rest))
+    Some((
+        Part {
+            value: month(word)?,
+            digits: 0,
+            named: true,
+        },
+        rest,
+    ))
 }
 
 /// The number of a month by its English or German name.
 fn month(word: &str) -> Option<i32> {
-    const NAMES: [&str; 12] =
-        ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"];
+    const NAMES: [&str; 12] = [
+        "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
+    ];
     let start = word.get(..3)?.to_ascii_lowercase();
     let start = match start.as_str() {
         "mai" => "may",
@@ -245,7 +301,9 @@ fn read_time(text: &str) -> Option<(i128, &str)> {
         fields[0] = first.parse().ok()?;
         let mut found = 1;
         while found < 3 {
-            let Some(after) = rest.strip_prefix(':') else { break };
+            let Some(after) = rest.strip_prefix(':') else {
+                break;
+            };
             let count = digits(after);
             if count == 0 || count > 2 {
                 return None;
@@ -283,8 +341,10 @@ fn read_time(text: &str) -> Option<(i128, &str)> {
     }
     let [hours, minutes, seconds] = fields;
     // 60 is a leap second.
-    (minutes < 60 && seconds <= 60)
-        .then_some((((hours * 60 + minutes) * 60 + seconds) * SECOND + fraction, rest))
+    (minutes < 60 && seconds <= 60).then_some((
+        ((hours * 60 + minutes) * 60 + seconds) * SECOND + fraction,
+        rest,
+    ))
 }
 
 /// `Z`, `UTC`, `+01:00`, `-0500`, or nothing; in seconds.
@@ -297,7 +357,10 @@ fn read_offset(text: &str) -> Option<Option<i128>> {
     if matches!(text, "Z" | "z" | "UTC" | "GMT") {
         return Some(Some(0));
     }
-    let text = text.strip_prefix("UTC").or(text.strip_prefix("GMT")).unwrap_or(text);
+    let text = text
+        .strip_prefix("UTC")
+        .or(text.strip_prefix("GMT"))
+        .unwrap_or(text);
     let sign = match text.as_bytes().first()? {
         b'+' => 1,
         b'-' => -1,
@@ -319,10 +382,21 @@ mod tests {
     #[test]
     fn one_moment_in_many_forms() {
         for text in [
-            "2026-11-23T10:05:00.25Z", "2026-11-23 10:05:00.250", "2026/11/23 10:05:00.25", "23.11.2026 10:05:00,250",
-            "23.11.26 10:05:00,250", "11/23/2026 10:05:00.25 AM", "23/11/2026 10:05:00:250", "23-Nov-2026 10:05:00.25",
-            "Nov 23, 2026 10:05:00.25", "20261123T100500.25", "2026-11-23T11:05:00.25+01:00", "Mon 23 Nov 2026 10:05:00.25",
-            "2026-11-23T05:05:00.25-0500", "2026-11-23T11:05:00,25+01:00[Europe/Berlin]", "2026-11-23_10:05:00.25",
+            "2026-11-23T10:05:00.25Z",
+            "2026-11-23 10:05:00.250",
+            "2026/11/23 10:05:00.25",
+            "23.11.2026 10:05:00,250",
+            "23.11.26 10:05:00,250",
+            "11/23/2026 10:05:00.25 AM",
+            "23/11/2026 10:05:00:250",
+            "23-Nov-2026 10:05:00.25",
+            "Nov 23, 2026 10:05:00.25",
+            "20261123T100500.25",
+            "2026-11-23T11:05:00.25+01:00",
+            "Mon 23 Nov 2026 10:05:00.25",
+            "2026-11-23T05:05:00.25-0500",
+            "2026-11-23T11:05:00,25+01:00[Europe/Berlin]",
+            "2026-11-23_10:05:00.25",
         ] {
             let format = Format::of([text].into_iter()).unwrap_or_else(|| panic!("{text}"));
             let found = format.nanoseconds(text).unwrap_or_else(|| panic!("{text}"));
@@ -331,14 +405,23 @@ mod tests {
         let clock = Format::of(["10:00:00.5"].into_iter()).unwrap();
         assert_eq!(clock.nanoseconds("10:00:00.5"), Some(36_000_500_000_000));
         let noon = Format::of(["11/23/2026 12:00:01 PM"].into_iter()).unwrap();
-        assert_eq!(iso(noon.nanoseconds("11/23/2026 12:00:01 PM").unwrap()), "2026-11-23 12:00:01");
+        assert_eq!(
+            iso(noon.nanoseconds("11/23/2026 12:00:01 PM").unwrap()),
+            "2026-11-23 12:00:01"
+        );
     }
 
     #[test]
     fn the_column_decides_on_the_order() {
         let of = |cells: &[&str]| Format::of(cells.iter().copied());
-        assert_eq!(of(&["01/02/2026 10:00", "01/13/2026 10:00"]).unwrap().order, Some(Order::MonthDayYear));
-        assert_eq!(of(&["01/02/2026 10:00", "13/02/2026 10:00"]).unwrap().order, Some(Order::DayMonthYear));
+        assert_eq!(
+            of(&["01/02/2026 10:00", "01/13/2026 10:00"]).unwrap().order,
+            Some(Order::MonthDayYear)
+        );
+        assert_eq!(
+            of(&["01/02/2026 10:00", "13/02/2026 10:00"]).unwrap().order,
+            Some(Order::DayMonthYear)
+        );
         let vague = of(&["01/02/2026 10:00"]).unwrap();
         assert!(vague.ambiguous);
         assert!(!of(&["01.02.2026 10:00"]).unwrap().ambiguous);
@@ -347,7 +430,19 @@ mod tests {
 
     #[test]
     fn what_is_no_stamp() {
-        for text in ["", "monday", "1.5", "12", "-3", "1e5", "a:b", "10:99:00", "V", "2026-13-45 10:00", "--"] {
+        for text in [
+            "",
+            "monday",
+            "1.5",
+            "12",
+            "-3",
+            "1e5",
+            "a:b",
+            "10:99:00",
+            "V",
+            "2026-13-45 10:00",
+            "--",
+        ] {
             let found = Format::of([text].into_iter()).and_then(|f| f.nanoseconds(text));
             assert_eq!(found, None, "{text}");
         }

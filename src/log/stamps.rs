@@ -14,13 +14,29 @@ const DATES: std::ops::RangeInclusive<f64> = 3e8..=7.3e9;
 /// Cells that are looked at to tell how a column writes dates.
 const LOOKED_AT: usize = 4000;
 
+/// A date and time, as the stamps say it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Origin {
+    /// Nanoseconds since 1970-01-01 00:00:00, of UTC when the stamps say so and else of the logger's own clock.
+    pub nanoseconds: i128,
+    /// Whether the stamps are known to be UTC: they count from 1970.
+    pub utc: bool,
+}
+
+impl std::fmt::Display for Origin {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&iso(self.nanoseconds))?;
+        f.write_str(if self.utc { " UTC" } else { "" })
+    }
+}
+
 /// A time column in seconds.
 #[derive(Debug)]
 pub(super) struct Stamps {
     /// Seconds since the origin, or as the column counts them; NaN where there is none.
     pub(super) seconds: Vec<f64>,
     /// Date and time at second zero, when the column says so.
-    pub(super) origin: Option<String>,
+    pub(super) origin: Option<Origin>,
     /// What a stamp is rounded to as a number, in seconds.
     pub(super) rounding: f64,
     pub(super) said: Option<String>,
@@ -36,7 +52,13 @@ pub(super) fn epoch(value: f64, unit: TimeUnit, sure: bool) -> Option<TimeUnit> 
     if sure || (value * unit.seconds() <= *DATES.end() && unit != TimeUnit::Seconds) {
         return None;
     }
-    [TimeUnit::Milliseconds, TimeUnit::Microseconds, TimeUnit::Nanoseconds].into_iter().find(|unit| dated(*unit))
+    [
+        TimeUnit::Milliseconds,
+        TimeUnit::Microseconds,
+        TimeUnit::Nanoseconds,
+    ]
+    .into_iter()
+    .find(|unit| dated(*unit))
 }
 
 /// Reads the cells of the time column; `error` says what is wrong with one that is no time.
@@ -56,8 +78,13 @@ pub(super) fn read(
             Some(unit) => since_1970(cells, mark, unit, unit != stated, &column, error),
             None => {
                 let scale = stated.seconds();
-                let seconds: Vec<f64> = numbers(cells, error, |cell| mark.number(cell).map(|v| v * scale))?;
-                let largest = seconds.iter().copied().filter(|s| s.is_finite()).fold(0.0, |m: f64, s| m.max(s.abs()));
+                let seconds: Vec<f64> =
+                    numbers(cells, error, |cell| mark.number(cell).map(|v| v * scale))?;
+                let largest = seconds
+                    .iter()
+                    .copied()
+                    .filter(|s| s.is_finite())
+                    .fold(0.0, |m: f64, s| m.max(s.abs()));
                 Ok(Stamps {
                     seconds,
                     origin: None,
@@ -69,7 +96,9 @@ pub(super) fn read(
     }
     let stride = (cells.len() / LOOKED_AT).max(1);
     let Some(format) = Format::of(present().step_by(stride)) else {
-        let bad = cells.iter().position(|cell| !is_missing(cell) && Format::of(std::iter::once(*cell)).is_none());
+        let bad = cells
+            .iter()
+            .position(|cell| !is_missing(cell) && Format::of(std::iter::once(*cell)).is_none());
         return Err(error(bad.unwrap_or(0)));
     };
     let mut whole: Vec<Option<i128>> = Vec::with_capacity(cells.len());
@@ -91,16 +120,26 @@ pub(super) fn read(
     let first = whole.iter().flatten().next().copied().unwrap_or(0);
     let origin = iso(first);
     let said = match format.order {
-        None => format!("`{column}` is a time of day; time zero is the first, {}", origin.get(11..).unwrap_or_default()),
+        None => format!(
+            "`{column}` is a time of day; time zero is the first, {}",
+            origin.get(11..).unwrap_or_default()
+        ),
         Some(order) => format!(
             "`{column}` holds dates as {}{}; time zero is {origin}",
             order.words(),
-            if format.ambiguous { " (day and month may be the other way round)" } else { "" }
+            if format.ambiguous {
+                " (day and month may be the other way round)"
+            } else {
+                ""
+            }
         ),
     };
     Ok(Stamps {
         seconds: relative(&whole, first, 1e-9),
-        origin: format.order.map(|_| origin),
+        origin: format.order.map(|_| Origin {
+            nanoseconds: first,
+            utc: false,
+        }),
         rounding: 0.0,
         said: Some(said),
     })
@@ -143,12 +182,19 @@ fn since_1970(
         });
     }
     let first = whole.iter().flatten().next().copied().unwrap_or(0);
-    let origin = iso((first as f64 * unit.seconds()) as i128);
+    // Billionths of the unit to nanoseconds: a division by 1, a thousand, a million or a billion.
+    let origin = Origin {
+        nanoseconds: first / (1.0 / unit.seconds()).round().max(1.0) as i128,
+        utc: true,
+    };
     let by = if by_size { " by their size" } else { "" };
     Ok(Stamps {
         seconds: relative(&whole, first, 1e-9 * unit.seconds()),
-        said: Some(format!("`{column}` counts {}{by} from 1970; time zero is {origin} UTC", plural(unit))),
-        origin: Some(format!("{origin} UTC")),
+        said: Some(format!(
+            "`{column}` counts {}{by} from 1970; time zero is {origin}",
+            plural(unit)
+        )),
+        origin: Some(origin),
         rounding,
     })
 }
@@ -182,7 +228,10 @@ fn billionths(cell: &str, mark: Mark) -> Option<i128> {
     }
     let mut value: i128 = whole.parse().ok()?;
     for place in 0..9 {
-        let digit = fraction.as_bytes().get(place).map_or(0, |b| i128::from(b - b'0'));
+        let digit = fraction
+            .as_bytes()
+            .get(place)
+            .map_or(0, |b| i128::from(b - b'0'));
         value = value * 10 + digit;
     }
     Some(value)
@@ -200,21 +249,31 @@ pub(super) fn first_look(
     let mut stamps: Vec<f64> = Vec::with_capacity(ROWS);
     for line in text.split(|byte| *byte == b'\n').take(ROWS) {
         super::parse::split(line, header.separator, &mut fields);
-        let cell = fields.get(index).and_then(|range| line.get(range.clone())).unwrap_or_default();
+        let cell = fields
+            .get(index)
+            .and_then(|range| line.get(range.clone()))
+            .unwrap_or_default();
         match decimal::read(cell).filter(|(_, used)| *used == cell.len()) {
             Some((value, _)) => stamps.push(value),
             None => break,
         }
     }
-    let Some(first) = stamps.first() else { return Ok(()) };
-    let Ok(stated) = time_unit(header, index, roles.time_unit) else { return Ok(()) };
+    let Some(first) = stamps.first() else {
+        return Ok(());
+    };
+    let Ok(stated) = time_unit(header, index, roles.time_unit) else {
+        return Ok(());
+    };
     let dated = epoch(*first, stated, roles.time_unit.is_some());
     let unit = dated.unwrap_or(stated).seconds();
     if let Some(asked) = roles.sample_time {
         return check_sample_time(header, index, stamps.iter().map(|s| s * unit), asked);
     }
     if dated.is_some() {
-        return Err(LogError::Dated { name: header.name.clone(), column: header.column(index) });
+        return Err(LogError::Dated {
+            name: header.name.clone(),
+            column: header.column(index),
+        });
     }
     Ok(())
 }
@@ -240,7 +299,8 @@ pub(super) fn check_sample_time(
     let median = steps.get(steps.len() / 2).copied().unwrap_or(mean);
     // Stamps that are rounded to more than a step say little.
     let largest = stamps.iter().fold(0.0, |m: f64, s| m.max(s.abs()));
-    let off = |step: f64| (step - asked).abs() > CONTRADICTION * asked + 4.0 * f64::EPSILON * largest;
+    let off =
+        |step: f64| (step - asked).abs() > CONTRADICTION * asked + 4.0 * f64::EPSILON * largest;
     if off(mean) && off(median) && median > 0.0 {
         return Err(LogError::SampleTimeContradicted {
             name: header.name.clone(),

@@ -43,22 +43,36 @@ impl<'a> Whole<'a> {
         need: RoleNeed,
     ) -> Result<Option<Self>, LogError> {
         let all = layout::lines(text);
-        let Some(layout) = layout::find(name, &all, roles) else { return Ok(None) };
+        let Some(layout) = layout::find(name, &all, roles) else {
+            return Ok(None);
+        };
         let header = &layout.header;
         let assigned = assign(roles, need, header)?;
         let mut said = Vec::new();
         let (rows, lines) = rows_of(&all, &layout, &assigned, &mut said)?;
         if rows.is_empty() {
-            return Err(LogError::NoData { name: name.to_owned(), line: header.line });
+            return Err(LogError::NoData {
+                name: name.to_owned(),
+                line: header.line,
+            });
         }
-        let wanted: Vec<usize> =
-            assigned.inputs.iter().chain(&assigned.outputs).chain(&assigned.time).copied().collect();
+        let wanted: Vec<usize> = assigned
+            .inputs
+            .iter()
+            .chain(&assigned.outputs)
+            .chain(&assigned.time)
+            .copied()
+            .collect();
         let marks = marks(&rows, header.separator, &wanted);
         if marks.contains(&Mark::Comma) {
             said.push("decimal commas".to_owned());
         }
         let channels = assigned.inputs.len() + assigned.outputs.len();
-        let parser = RowParser::new(header.clone(), vec![None; header.channels.len()], assigned.time);
+        let parser = RowParser::new(
+            header.clone(),
+            vec![None; header.channels.len()],
+            assigned.time,
+        );
         let mut columns = vec![Vec::with_capacity(rows.len()); channels];
         let mut cells: Vec<&str> = Vec::new();
         let mut times: Vec<&str> = Vec::new();
@@ -92,7 +106,15 @@ impl<'a> Whole<'a> {
             }
             None => None,
         };
-        Ok(Some(Self { layout, assigned, columns, stamps, rows, lines, said }))
+        Ok(Some(Self {
+            layout,
+            assigned,
+            columns,
+            stamps,
+            rows,
+            lines,
+            said,
+        }))
     }
 }
 
@@ -107,7 +129,9 @@ fn rows_of<'a>(
 ) -> Result<Rows<'a>, LogError> {
     let header = &layout.header;
     let expected = header.raw.len();
-    let title = (!header.headerless).then(|| all.get(header.line as usize - 1)).flatten();
+    let title = (!header.headerless)
+        .then(|| all.get(header.line as usize - 1))
+        .flatten();
     let (mut rows, mut lines) = (Vec::new(), Vec::new());
     let (mut blank, mut again) = (0, 0);
     let mut waiting = 0;
@@ -126,13 +150,20 @@ fn rows_of<'a>(
         if cells.len() < expected || extra.iter().any(|cell| !cell.is_empty()) {
             let says = |cells: &[&str]| {
                 let wanted = assigned.inputs.iter().chain(&assigned.outputs);
-                let number = |at: &usize| cells.get(*at).is_some_and(|cell| super::cells::is_number(cell));
+                let number = |at: &usize| {
+                    cells
+                        .get(*at)
+                        .is_some_and(|cell| super::cells::is_number(cell))
+                };
                 wanted.clone().any(number)
             };
             // Remarks at the end of a file have no numbers where the channels are.
             let mut rest = all.iter().skip(index);
             if !rest.any(|line| says(&layout::cut(line, header.separator))) {
-                said.push(format!("{} of text below the data", counted(all.len() - index, "line")));
+                said.push(format!(
+                    "{} of text below the data",
+                    counted(all.len() - index, "line")
+                ));
                 break;
             }
             let parser = RowParser::new(header.clone(), vec![None; expected], assigned.time);
@@ -145,13 +176,29 @@ fn rows_of<'a>(
     if blank > 0 {
         // Without a time column a blank line may stand for anything.
         if assigned.time.is_none() {
-            let line = lines.windows(2).find(|w| w[1] > w[0] + 1).map_or(0, |w| w[0] + 1);
-            return Err(LogError::BlankLine { name: header.name.clone(), line });
+            let line = lines
+                .windows(2)
+                .find(|w| w[1] > w[0] + 1)
+                .map_or(0, |w| w[0] + 1);
+            return Err(LogError::BlankLine {
+                name: header.name.clone(),
+                line,
+            });
         }
-        said.push(format!("{} between rows skipped", counted(blank, "blank line")));
+        said.push(format!(
+            "{} between rows skipped",
+            counted(blank, "blank line")
+        ));
     }
     if again > 0 {
-        said.push(format!("the header {} again", if again == 1 { "once".to_owned() } else { format!("{again} times") }));
+        said.push(format!(
+            "the header {} again",
+            if again == 1 {
+                "once".to_owned()
+            } else {
+                format!("{again} times")
+            }
+        ));
     }
     Ok((rows, lines))
 }

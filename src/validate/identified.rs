@@ -63,7 +63,12 @@ fn check_recorded_once(model: &Model) -> Result<(), IdentifyError> {
     for (index, recording) in model.recordings.iter().enumerate() {
         let copy = model.recordings[..index]
             .iter()
-            .find(|other| other.sha256.is_some() && other.sha256 == recording.sha256);
+            // Parts of one file begin at times of their own.
+            .find(|other| {
+                other.sha256.is_some()
+                    && other.sha256 == recording.sha256
+                    && other.start_time == recording.start_time
+            });
         if let Some(copy) = copy {
             return Err(IdentifyError::SameRecording {
                 first: copy.name.clone(),
