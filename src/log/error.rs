@@ -316,7 +316,9 @@ pub enum LogError {
     )]
     InParts { name: String, said: String },
     /// What the plain reader leaves to the one that looks at the whole file.
-    #[error("{name}: column `{column}` holds seconds since 1970 or dates")]
+    #[error(
+        "{name}: column `{column}` holds dates, or time in another unit than seconds; read the file as a whole"
+    )]
     Dated { name: String, column: String },
     /// The sample time asked for is zero, negative or not finite.
     #[error(

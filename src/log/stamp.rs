@@ -43,6 +43,8 @@ pub(super) struct Format {
     pub(super) order: Option<Order>,
     /// Day and month could be swapped in every stamp.
     pub(super) ambiguous: bool,
+    /// The stamps have an offset from UTC.
+    pub(super) offset: bool,
 }
 
 impl Format {
@@ -51,10 +53,11 @@ impl Format {
         let mut order = None;
         let mut dated = None;
         let (mut day_first, mut month_first, mut dots, mut american) = (false, false, false, false);
-        let mut any = false;
+        let (mut any, mut offset) = (false, false);
         for cell in cells {
             let parts = take_apart(cell)?;
             any = true;
+            offset |= parts.offset.is_some();
             if *dated.get_or_insert(parts.date.is_some()) != parts.date.is_some() {
                 return None;
             }
@@ -80,6 +83,7 @@ impl Format {
             return Some(Self {
                 order: None,
                 ambiguous: false,
+                offset,
             });
         }
         let guessed = if month_first || (!day_first && american && !dots) {
@@ -90,6 +94,7 @@ impl Format {
         Some(Self {
             order: Some(order.unwrap_or(guessed)),
             ambiguous: order.is_none() && !day_first && !month_first && !dots,
+            offset,
         })
     }
 

@@ -44,7 +44,8 @@ pub(super) struct Stamps {
 
 /// The unit of numbers that may count from 1970: in which they are dates, by their size. `None` when they are no dates.
 pub(super) fn epoch(value: f64, unit: TimeUnit, sure: bool) -> Option<TimeUnit> {
-    let dated = |unit: TimeUnit| DATES.contains(&(value * unit.seconds()));
+    // Days and hours are counted from other days than that of Unix.
+    let dated = |unit: TimeUnit| unit.seconds() <= 1.0 && DATES.contains(&(value * unit.seconds()));
     if dated(unit) {
         return Some(unit);
     }
@@ -118,11 +119,15 @@ pub(super) fn read(
         whole.push(Some(stamp + days * DAY));
     }
     let first = whole.iter().flatten().next().copied().unwrap_or(0);
-    let origin = iso(first);
+    let origin = Origin {
+        nanoseconds: first,
+        utc: format.offset,
+    };
+    let clock = iso(first);
     let said = match format.order {
         None => format!(
             "`{column}` is a time of day; time zero is the first, {}",
-            origin.get(11..).unwrap_or_default()
+            clock.get(11..).unwrap_or_default()
         ),
         Some(order) => format!(
             "`{column}` holds dates as {}{}; time zero is {origin}",
@@ -138,7 +143,7 @@ pub(super) fn read(
         seconds: relative(&whole, first, 1e-9),
         origin: format.order.map(|_| Origin {
             nanoseconds: first,
-            utc: false,
+            utc: format.offset,
         }),
         rounding: 0.0,
         said: Some(said),
@@ -269,7 +274,10 @@ pub(super) fn first_look(
     if let Some(asked) = roles.sample_time {
         return check_sample_time(header, index, stamps.iter().map(|s| s * unit), asked);
     }
-    if dated.is_some() {
+    let from_name = roles.time_unit.is_none()
+        && header.channels.get(index).is_some_and(|c| c.unit.is_none())
+        && stated != TimeUnit::Seconds;
+    if dated.is_some() || from_name {
         return Err(LogError::Dated {
             name: header.name.clone(),
             column: header.column(index),
