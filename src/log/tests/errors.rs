@@ -12,19 +12,7 @@ fn cells_that_are_no_numbers() {
     fails(with("abc"), &[place[0], "`abc` is not a number"]);
     fails(with("1.5x"), &[place[0], "`1.5x` is not a number"]);
     fails(with("0x10"), &[place[0], "not a number"]);
-    fails(with(""), &[place[0], "empty", "interpolate"]);
-    fails(with("\"\""), &[place[0], "empty"]);
-    fails(with("  "), &[place[0], "empty"]);
-    for cell in [
-        "nan",
-        "NaN",
-        "inf",
-        "-Infinity",
-        "1e999",
-        "NA",
-        "null",
-        "-1.#IND",
-    ] {
+    for cell in ["inf", "-Infinity", "1e999"] {
         fails(
             with(cell),
             &[place[0], cell, "not a finite number", "two experiments"],
