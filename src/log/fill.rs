@@ -4,7 +4,7 @@ use super::clock::{BRIDGED, Piece};
 use super::roles::Missing;
 
 /// Fewer samples in a row are left out when a recording is cut: they are shorter than the past that any model looks at.
-const SHORTEST: usize = 20;
+pub(super) const SHORTEST: usize = 20;
 
 /// Samples without a gap.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,7 +5,7 @@ use std::io::{Cursor, Read};
 
 use super::clock::{self, Piece, Rows, counted};
 use super::error::LogError;
-use super::fill::{Filled, Tally, fill};
+use super::fill::{Filled, SHORTEST, Tally, fill};
 use super::reader::LogReader;
 use super::record::Log;
 use super::resample::Resampling;
@@ -351,6 +351,16 @@ impl Assembly<'_> {
             for part in fill(piece, &self.table.columns, self.roles.missing, &mut tally) {
                 parts.push((start + part.from as f64 * step, part));
             }
+        }
+        let length = |part: &Filled| part.columns.first().map_or(0, Vec::len);
+        if parts.iter().any(|(_, part)| length(part) >= SHORTEST) {
+            let short = |part: &(f64, Filled)| length(&part.1) < SHORTEST;
+            tally.left_out += parts
+                .iter()
+                .filter(|p| short(p))
+                .map(|p| length(&p.1))
+                .sum::<usize>();
+            parts.retain(|part| !short(part));
         }
         let samples: usize = parts
             .iter()
