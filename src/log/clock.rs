@@ -1,17 +1,15 @@
-//! Time stamps to a grid: which sample each row is, where the clock was repaired, and where a recording ends and another
-//! begins.
+//! Time stamps to a grid: which sample each row is, and where a recording ends and another begins.
 //!
 //! The step is the mean of the steps near their median, refined by least squares over all rows. A row is placed by
 //! following the phase of the clock, which jitter of less than half a sample does not lose.
 
 use super::error::LogError;
+use super::repair::{repair, spread_coarse};
 use super::roles::Missing;
 use super::sampling::{GAP, STEP_TOLERANCE, check_drift, readable, shortest_within};
 
-/// Share of rows that have the stamp of the row before from which on the stamps are taken to be coarse.
-const COARSE: f64 = 0.25;
 /// Share of rows whose stamp may be in conflict with the others.
-const CONFLICTS: f64 = 0.01;
+pub(super) const CONFLICTS: f64 = 0.01;
 /// Samples missing in a row that are interpolated; more are a gap. Two points of a straight line between neighbours
 /// say little that the neighbours do not.
 pub(super) const BRIDGED: usize = 2;
@@ -171,7 +169,7 @@ pub(super) fn lay(
 }
 
 impl Rows<'_> {
-    fn line(&self, row: usize) -> u64 {
+    pub(super) fn line(&self, row: usize) -> u64 {
         self.lines.get(row).copied().unwrap_or(0)
     }
 
@@ -185,7 +183,7 @@ impl Rows<'_> {
         }
     }
 
-    fn not_increasing(&self, before: f64, row: usize, after: f64) -> LogError {
+    pub(super) fn not_increasing(&self, before: f64, row: usize, after: f64) -> LogError {
         LogError::TimeNotIncreasing {
             name: self.name.to_owned(),
             line: self.line(row),
@@ -202,7 +200,7 @@ pub(super) fn counted(count: usize, noun: &str) -> String {
 }
 
 /// The mean of the steps within half of their median.
-fn typical_step(rows: &[(usize, f64)]) -> Option<f64> {
+pub(super) fn typical_step(rows: &[(usize, f64)]) -> Option<f64> {
     let mut steps: Vec<f64> = rows
         .windows(2)
         .map(|w| w[1].1 - w[0].1)
@@ -219,160 +217,6 @@ fn typical_step(rows: &[(usize, f64)]) -> Option<f64> {
         .filter(|s| (s / median - 1.0).abs() < 0.5)
         .collect();
     Some(near.iter().sum::<f64>() / near.len() as f64)
-}
-
-/// Stamps with fewer digits than the sampling needs: rows that share one are spread evenly when there are as many of them
-/// at every stamp.
-fn spread_coarse(rows: &Rows<'_>, kept: &mut [(usize, f64)]) -> Result<Option<String>, LogError> {
-    let shared = kept.windows(2).filter(|w| w[0].1 == w[1].1).count();
-    if (shared as f64) < COARSE * kept.len() as f64 {
-        return Ok(None);
-    }
-    let groups: Vec<&[(usize, f64)]> = kept.chunk_by(|a, b| a.1 == b.1).collect();
-    let first_row = kept.first().map_or(0, |(row, _)| *row);
-    let Some(inner) = groups
-        .get(1..groups.len().saturating_sub(1))
-        .filter(|g| !g.is_empty())
-    else {
-        return Err(rows.not_increasing(kept[0].1, first_row + 1, kept[0].1));
-    };
-    let stamp = |group: &[(usize, f64)]| group.first().map_or(f64::NAN, |(_, time)| *time);
-    if let Some(pair) = groups.windows(2).find(|w| stamp(w[1]) < stamp(w[0])) {
-        let row = pair[1].first().map_or(0, |(row, _)| *row);
-        return Err(rows.not_increasing(stamp(pair[0]), row, stamp(pair[1])));
-    }
-    let (least, most) = inner.iter().fold((usize::MAX, 0), |(a, b), g| {
-        (a.min(g.len()), b.max(g.len()))
-    });
-    let mut steps: Vec<f64> = groups
-        .windows(2)
-        .map(|w| stamp(w[1]) - stamp(w[0]))
-        .collect();
-    steps.sort_by(f64::total_cmp);
-    let resolution = steps.get(steps.len() / 2).copied().unwrap_or(f64::NAN);
-    let even = steps
-        .iter()
-        .all(|step| (step / resolution - 1.0).abs() < STEP_TOLERANCE);
-    if most - least > 1 || !even {
-        return Err(LogError::CoarseStamps {
-            name: rows.name.to_owned(),
-            column: rows.column.to_owned(),
-            resolution: readable(resolution),
-            least,
-            most,
-        });
-    }
-    // Whole groups only: the first and the last may be cut.
-    let counted_rows: usize = inner.iter().map(|group| group.len()).sum();
-    let span = stamp(groups[groups.len() - 1]) - stamp(inner[0]);
-    let step = span / counted_rows as f64;
-    let (origin, skipped) = (stamp(inner[0]), groups[0].len() as f64);
-    for (index, row) in kept.iter_mut().enumerate() {
-        row.1 = origin + (index as f64 - skipped) * step;
-    }
-    let many = if least == most {
-        most.to_string()
-    } else {
-        format!("{least} or {most}")
-    };
-    Ok(Some(format!(
-        "time stamps only to {} s, each shared by {many} rows: the rows are spread evenly, {} s apart",
-        readable(resolution),
-        readable(step)
-    )))
-}
-
-/// Rows written twice are dropped; stamps that repeat or are out of order are put where the grid has a place for them.
-fn repair(
-    rows: &Rows<'_>,
-    kept: &mut Vec<(usize, f64)>,
-    policy: Missing,
-    said: &mut Vec<String>,
-) -> Result<(), LogError> {
-    let Some(step) = typical_step(kept) else {
-        return Err(rows.not_increasing(kept[0].1, kept[1].0, kept[1].1));
-    };
-    if policy == Missing::Error {
-        return match kept.windows(2).find(|w| w[1].1 <= w[0].1) {
-            Some(w) => Err(rows.not_increasing(w[0].1, w[1].0, w[1].1)),
-            None => Ok(()),
-        };
-    }
-    let before = kept.len();
-    let mut last: Option<(usize, f64)> = None;
-    kept.retain(|&(row, time)| {
-        let again = last.is_some_and(|(r, t)| t == time && r + 1 == row && (rows.same)(row));
-        last = Some((row, time));
-        !again
-    });
-    if kept.len() < before {
-        said.push(format!(
-            "{} written twice: the second dropped",
-            counted(before - kept.len(), "row")
-        ));
-    }
-    let near = |found: f64, steps: f64| (found - steps * step).abs() < 0.5 * step;
-    let (mut repaired, mut conflicts) = (Vec::new(), Vec::new());
-    let mut at = 0;
-    while at < kept.len() {
-        let time = kept[at].1;
-        let run = kept[at..].iter().take_while(|row| row.1 == time).count();
-        if run > 1 {
-            let count = run as f64;
-            let previous = at.checked_sub(1).map(|p| kept[p].1);
-            let next = kept.get(at + run).map(|row| row.1);
-            let forward = next.map_or(previous.is_some_and(|p| near(time - p, 1.0)), |next| {
-                near(next - time, count)
-            });
-            let backward = previous.map_or(next.is_some_and(|n| near(n - time, 1.0)), |p| {
-                near(time - p, count)
-            });
-            if forward || backward {
-                for (k, row) in kept[at..at + run].iter_mut().enumerate() {
-                    let shift = if forward {
-                        k as f64
-                    } else {
-                        k as f64 - (count - 1.0)
-                    };
-                    row.1 = time + shift * step;
-                }
-                repaired.extend(kept[at..at + run].iter().skip(1).map(|row| row.0));
-            } else {
-                conflicts.extend(kept[at + 1..at + run].iter().map(|row| (row.0, time)));
-            }
-        }
-        at += run;
-    }
-    // One stamp that is out of order, between two that are two steps apart.
-    for at in 1..kept.len().saturating_sub(1) {
-        let (a, b, c) = (kept[at - 1].1, kept[at].1, kept[at + 1].1);
-        if near(c - a, 2.0) && (b <= a || b >= c) {
-            kept[at].1 = 0.5 * (a + c);
-            repaired.push(kept[at].0);
-        }
-    }
-    if conflicts.len() as f64 > CONFLICTS * kept.len() as f64
-        && let Some((row, time)) = conflicts.first()
-    {
-        return Err(rows.not_increasing(*time, *row, *time));
-    }
-    if let Some(first) = repaired.first() {
-        said.push(format!(
-            "{} repaired from the grid (repeated or out of order), first in line {}",
-            counted(repaired.len(), "time stamp"),
-            rows.line(*first)
-        ));
-    }
-    if let Some((first, _)) = conflicts.first() {
-        said.push(format!(
-            "{} with the stamp of another row and no free place on the grid dropped, first in line {}",
-            counted(conflicts.len(), "row"),
-            rows.line(*first)
-        ));
-        let dropped: std::collections::HashSet<usize> = conflicts.iter().map(|c| c.0).collect();
-        kept.retain(|row| !dropped.contains(&row.0));
-    }
-    Ok(())
 }
 
 type Run = Vec<(usize, f64)>;

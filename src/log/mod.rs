@@ -22,6 +22,7 @@
 //! | `whole`       | a text as a table of numbers                                    |
 //! | `stamp`, `stamps` | a date; a time column                                       |
 //! | `clock`       | time stamps to a grid, repaired                                 |
+//! | `repair`      | stamps that are coarse, repeated or out of order                |
 //! | `fill`        | missing samples: bridged, or the recording is cut               |
 //! | `resample`    | another rate                                                    |
 //! | `unit`        | is this a unit                                                  |
@@ -66,6 +67,7 @@ mod parse;
 mod reader;
 mod reading;
 mod record;
+mod repair;
 mod resample;
 mod roles;
 mod sampling;
