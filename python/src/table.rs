@@ -24,6 +24,7 @@ pub fn find_columns(
         outputs,
         time,
         sample_time: dt,
+        ..Roles::default()
     };
     let need = match need {
         "inputs" => RoleNeed::InputsOnly,

@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::Batch;
 use super::row::{Row, Status};
-use crate::identify::{FileRecords, IdentifyError};
+use crate::identify::{IdentifyError, on_files};
 use crate::log::{LogError, Source, write_file_atomically};
 use crate::report::{DocumentError, ModelDocument, ReadModel, Request, read_model};
 use crate::validate::{TestedModel, identify_and_test};
@@ -61,10 +61,15 @@ fn kept(log: &Path, model: &Path, request: &Request) -> Option<ReadModel> {
     {
         return None;
     }
-    let [recording] = provenance.recordings.as_slice() else {
+    // A log that was split has several recordings, of one hash.
+    let sha256 = provenance.recordings.first()?.sha256.clone()?;
+    if provenance
+        .recordings
+        .iter()
+        .any(|r| r.sha256.as_ref() != Some(&sha256))
+    {
         return None;
-    };
-    let sha256 = recording.sha256.clone()?;
+    }
     (sha256_of(log).ok()? == sha256).then_some(read)
 }
 
@@ -74,9 +79,10 @@ fn identified(
     batch: &Batch,
     request: Request,
 ) -> Result<TestedModel, Failure> {
-    let source = vec![Source::from(log.to_owned())];
-    let mut records = FileRecords::open(source, batch.roles.clone())?;
-    let tested = identify_and_test(&mut records, &batch.options)?;
+    let source = [Source::from(log.to_owned())];
+    let (tested, _) = on_files(&source, &batch.roles, None, &mut |records| {
+        identify_and_test(records, &batch.options)
+    })?;
     let document = ModelDocument::new(&tested.model)?
         .with_residual_tests(tested.tests.clone())
         .with_request(request);

@@ -54,9 +54,10 @@ impl Row {
         tests: Option<&Validation>,
     ) -> Self {
         let summary = model.summary.as_ref();
-        let found: Vec<String> = summary
+        let read = model.recordings.first().and_then(|r| r.reading.clone());
+        let found: Vec<String> = read
             .into_iter()
-            .flat_map(|s| s.warnings.iter().cloned())
+            .chain(summary.into_iter().flat_map(|s| s.warnings.iter().cloned()))
             .chain(tests.into_iter().flat_map(findings))
             .collect();
         Self {

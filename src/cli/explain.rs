@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::align::aligned;
 use super::output::{Output, check_distinct, note, paths, print};
-use super::roles::RoleFlags;
+use super::roles::{RoleFlags, tell_reading};
 use super::{Outcome, Verbosity};
 use crate::explain::{Explanation, Options, Simulation, Verdict, explain};
-use crate::log::{Log, RoleNeed, Roles, Source};
+use crate::log::{Channel, Log, LogError, Reading, RoleNeed, Roles, Source};
 use crate::report::text::explanation_text;
 use crate::report::{explanation_page, read_model, to_json};
 
@@ -17,8 +18,8 @@ const EXAMPLE: &str = "Examples:
   innovant explain recording.csv --simulation model.json --report page.html
   innovant simulate explanation.json new_input.csv --output prediction.csv
 
-The simulation is a CSV of its outputs on the recorded inputs (one file a recording, in the same order), or one linear
-model as JSON ({\"A\":..,\"B\":..,\"C\":..,\"D\":..,\"dt\":..}, or what `innovant identify` writes).
+The simulation is a CSV of its outputs on the recorded inputs (one file a recording, in the same order; compared by time,
+on a grid of its own if that is finer), or one linear model as JSON ({\"A\":..,\"B\":..,\"C\":..,\"D\":..,\"dt\":..}, or what `innovant identify` writes).
 
 Effects (for --without):
   coulomb_friction stribeck_friction quadratic_drag cubic_stiffness quadratic_stiffness end_stop hysteresis
@@ -43,6 +44,9 @@ pub(super) struct Flags {
     simulation: Vec<PathBuf>,
     #[command(flatten)]
     roles: RoleFlags,
+    /// Which simulated output is which recorded one, when their names differ: SIMULATED=RECORDED, comma-separated
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    map: Vec<String>,
     /// Leave effects out of the library, comma-separated ids
     #[arg(long, value_name = "IDS", value_delimiter = ',')]
     without: Vec<String>,
@@ -67,16 +71,20 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     let read = paths(&sources);
     let (output, report) =
         Output::check_both(flags.output.as_deref(), flags.report.as_deref(), &read)?;
-    let roles = flags.roles.roles();
-    let mut logs: Vec<Log> = Vec::with_capacity(flags.logs.len());
+    let roles = flags.roles.clone().roles();
+    let mut readings: Vec<Reading> = Vec::with_capacity(flags.logs.len());
     for source in &flags.logs {
-        let log = Log::read(source, &roles)?;
-        if let Some(first) = logs.first() {
-            first.check_same_kind(&log)?;
+        let reading = Reading::read(source, &roles, RoleNeed::Identify)?;
+        tell_reading(&source.to_string(), reading.said.as_deref(), say);
+        if let (Some(first), Some(log)) = (
+            readings.first().and_then(|r| r.logs.first()),
+            reading.logs.first(),
+        ) {
+            first.check_same_kind(log)?;
         }
-        logs.push(log);
+        readings.push(reading);
     }
-    let simulation = simulation(&flags.simulation, &logs, &roles)?;
+    let (logs, simulation) = simulation(&flags, readings, &roles, say)?;
     let options = Options {
         without: flags.without.clone(),
         seed: flags.seed,
@@ -113,18 +121,24 @@ fn missing(explanation: &Explanation) -> bool {
     !matches!(explanation.verdict, Verdict::Consistent)
 }
 
-fn simulation(files: &[PathBuf], logs: &[Log], roles: &Roles) -> anyhow::Result<Simulation> {
+/// The recordings, and the simulation on the samples that they have in common.
+fn simulation(
+    flags: &Flags,
+    readings: Vec<Reading>,
+    roles: &Roles,
+    say: Verbosity,
+) -> anyhow::Result<(Vec<Log>, Simulation)> {
+    let files = &flags.simulation;
     let is_json = |path: &Path| {
         path.extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("json"))
     };
     if files.iter().any(|f| is_json(f)) {
-        if let [file] = files {
+        if let [file] = files.as_slice() {
             let model = read_model(file)?.model;
-            return Ok(Simulation::Model(
-                Box::new(model),
-                file.display().to_string(),
-            ));
+            let logs = readings.into_iter().flat_map(|r| r.logs).collect();
+            let simulation = Simulation::Model(Box::new(model), file.display().to_string());
+            return Ok((logs, simulation));
         }
         anyhow::bail!(
             "--simulation takes one model (JSON) for all recordings, or one CSV a recording; {} files are given, and one \
@@ -132,38 +146,84 @@ fn simulation(files: &[PathBuf], logs: &[Log], roles: &Roles) -> anyhow::Result<
             files.len()
         );
     }
-    if files.len() != logs.len() {
+    if files.len() != readings.len() {
         anyhow::bail!(
             "{} recordings and {} simulations: give one CSV of simulated outputs for each recording, in the same order",
-            logs.len(),
+            readings.len(),
             files.len()
         );
     }
-    files
-        .iter()
-        .zip(logs)
-        .map(|(file, log)| simulated(file, log, roles))
-        .collect::<anyhow::Result<Vec<Log>>>()
-        .map(Simulation::Outputs)
+    let (mut logs, mut outputs) = (Vec::new(), Vec::new());
+    for (file, reading) in files.iter().zip(&readings) {
+        let simulated = simulated(file, reading, roles, &flags.map)?;
+        let (pairs, said) = aligned(reading, &simulated)?;
+        let name = file.display().to_string();
+        tell_reading(&name, simulated.said.as_deref(), say);
+        tell_reading(&name, said.as_deref(), say);
+        for (log, simulation) in pairs {
+            logs.push(log);
+            outputs.push(simulation);
+        }
+    }
+    Ok((logs, Simulation::Outputs(outputs)))
 }
 
-/// Simulated outputs: by the recording's names where the file has them, else by its own headers.
-pub(super) fn simulated(file: &Path, log: &Log, roles: &Roles) -> anyhow::Result<Log> {
+/// Simulated outputs, by the names that the recording has for them or that `map` (simulated=recorded) gives them.
+fn simulated(
+    file: &Path,
+    recording: &Reading,
+    roles: &Roles,
+    map: &[String],
+) -> anyhow::Result<Reading> {
     let source = Source::from(file.to_owned());
-    let named = Roles {
+    let recorded: Vec<Channel> = recording
+        .logs
+        .first()
+        .map_or_else(Vec::new, |log| log.outputs.clone());
+    let mut wanted: Vec<String> = recorded.iter().map(|c| c.name.clone()).collect();
+    for pair in map {
+        let Some((from, to)) = pair.split_once('=') else {
+            anyhow::bail!("--map {pair}: write it as SIMULATED=RECORDED, such as `--map y9=y1`");
+        };
+        let to = Channel::parse(to);
+        let Some(at) = recorded.iter().position(|c| c.name == to.name) else {
+            let names: Vec<String> = recorded.iter().map(|c| format!("`{c}`")).collect();
+            anyhow::bail!(
+                "--map {pair}: the recording has no output `{to}`; its outputs are {}",
+                names.join(", ")
+            );
+        };
+        wanted[at] = from.trim().to_owned();
+    }
+    let named = |time: Option<String>| Roles {
         inputs: None,
-        outputs: Some(log.outputs.iter().map(|c| c.name.clone()).collect()),
+        outputs: Some(wanted.clone()),
+        time,
         ..roles.clone()
     };
-    match Log::read_with(&source, &named, RoleNeed::OutputsOnly) {
-        Ok(found) => Ok(found),
-        Err(first) => {
-            let own = Roles {
-                outputs: None,
-                inputs: None,
-                ..roles.clone()
-            };
-            Log::read_with(&source, &own, RoleNeed::OutputsOnly).map_err(|_| first.into())
+    let read = |time: Option<String>| Reading::read(&source, &named(time), RoleNeed::OutputsOnly);
+    let mut found = read(roles.time.clone());
+    // The time column of a simulator may have a name of its own.
+    if let Err(LogError::UnknownColumn { column, .. }) = &found
+        && Some(column) == roles.time.as_ref()
+    {
+        found = read(None);
+    }
+    match found {
+        Err(LogError::UnknownColumn {
+            name,
+            headers,
+            column,
+            ..
+        }) if wanted.contains(&column) => {
+            let names: Vec<String> = recorded.iter().map(|c| format!("`{c}`")).collect();
+            let first = recorded.first().map_or("y1", |c| c.name.as_str());
+            anyhow::bail!(
+                "{name}: no simulated output `{column}`: the recording's outputs are {}, and the columns of the simulation \
+                 are {headers}; rename one, or say which is which: `--map 'SIMULATED={first}'`",
+                names.join(", ")
+            )
         }
+        found => Ok(found?),
     }
 }

@@ -8,10 +8,10 @@ use clap::Args;
 use super::model_flags::ModelFlags;
 use super::output::{Output, check_distinct, note, paths, print};
 use super::progress::Progress;
-use super::roles::RoleFlags;
+use super::roles::{RoleFlags, tell_reading};
 use super::terminal::style;
 use super::{Outcome, Verbosity};
-use crate::identify::{FileRecords, IdentifyError, Model, Options, Order, Records};
+use crate::identify::{IdentifyError, Model, Options, Order, on_files};
 use crate::log::{Roles, Source};
 use crate::report::text::{ModelText, findings, model_text, verdict, wrapped};
 use crate::report::{ModelDocument, Request, Watched, identification_page};
@@ -81,16 +81,28 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     let plan = Plan::new(flags)?;
     let progress = Progress::over(&plan.sources, say.quiet);
     let started = Instant::now();
-    let mut records =
-        FileRecords::open(plan.sources, plan.roles)?.with_progress(progress.callback());
-    // Pictures of the recording are gathered in passing, and only for a page.
-    let mut watched = match &plan.report {
-        Some(_) => Reading::Watched(Watched::new(&mut records)),
-        None => Reading::Plain(&mut records),
-    };
-    let TestedModel { model, tests } = identify_and_test(watched.records(), &plan.options)
-        .map_err(|error| with_names(error, &logs))?;
+    let with_page = plan.report.is_some();
+    let done = on_files(
+        &plan.sources,
+        &plan.roles,
+        Some(progress.callback()),
+        &mut |records| {
+            // Pictures of the recording are gathered in passing, and only for a page.
+            if with_page {
+                let mut watched = Watched::new(records);
+                let tested = identify_and_test(&mut watched, &plan.options)?;
+                Ok((tested, Some(watched.overview())))
+            } else {
+                Ok((identify_and_test(records, &plan.options)?, None))
+            }
+        },
+    );
+    let ((TestedModel { model, tests }, overview), said) =
+        done.map_err(|error| with_names(error, &logs))?;
     progress.finish();
+    for (name, text) in &said {
+        tell_reading(name, Some(text), say);
+    }
     if say.verbose {
         for recording in &model.recordings {
             note(&format!(
@@ -124,12 +136,11 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
             .with_request(plan.request);
         output.write(&document.to_json()?)?;
     }
-    if let (Some(report), Reading::Watched(watched)) = (&plan.report, &watched) {
-        let overview = watched.overview();
+    if let Some(report) = &plan.report {
         report.write(&identification_page(
             &model,
             tests.as_ref(),
-            Some(&overview),
+            overview.as_ref(),
         )?)?;
     }
     if say.quiet {
@@ -146,21 +157,6 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         print(&format!("{gap}written to {}\n", output.path().display()))?;
     }
     Ok(Outcome::Done)
-}
-
-/// Recordings, watched for a page or not.
-enum Reading<'a> {
-    Plain(&'a mut dyn Records),
-    Watched(Watched<'a>),
-}
-
-impl Reading<'_> {
-    fn records(&mut self) -> &mut dyn Records {
-        match self {
-            Self::Plain(records) => *records,
-            Self::Watched(watched) => watched,
-        }
-    }
 }
 
 /// What a person should know when the table goes nowhere.

@@ -5,6 +5,7 @@
 //! message on standard error. When the reader of standard output has gone (`innovant ... | head`), the work
 //! counts as done.
 
+mod align;
 mod batch;
 mod completions;
 mod explain;

@@ -1,10 +1,11 @@
 //! Which column is what: the flags that every command which reads a log has.
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
-use super::numbers;
+use super::output::note;
+use super::{Verbosity, numbers};
 use crate::identify::IdentifiedChannel;
-use crate::log::{Channel, Roles};
+use crate::log::{Channel, Missing, Roles, TimeUnit};
 
 /// Columns and time base.
 #[derive(Debug, Clone, Args)]
@@ -16,22 +17,69 @@ pub(super) struct RoleFlags {
     /// Output columns, comma-separated [default: headers that start with y]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     outputs: Option<Vec<String>>,
-    /// Time column [default: t or time]
+    /// Time column: numbers, dates or times of day; `none` when there is none [default: t, time, timestamp]
     #[arg(long, value_name = "NAME")]
     time: Option<String>,
-    /// Sample time in seconds; the time column is then not read
+    /// Sample time in seconds; rows follow each other at it, and a time column may not contradict it
     #[arg(long, value_name = "SECONDS", value_parser = numbers::seconds, allow_negative_numbers = true)]
     dt: Option<f64>,
+    /// Samples that are missing, as rows or as cells [default: up to two in a row are interpolated, at more the recording is
+    /// split]
+    #[arg(long, value_enum, value_name = "HOW")]
+    missing: Option<MissingFlag>,
+    /// Put the recording on a uniform grid of this step, without aliases: for jitter and other rates
+    #[arg(long, value_name = "SECONDS", value_parser = numbers::seconds, allow_negative_numbers = true)]
+    resample: Option<f64>,
+    /// Unit of the time column, whatever its header says: s, ms, us, ns, min, h or d
+    #[arg(long, value_name = "UNIT", value_parser = time_unit)]
+    time_unit: Option<TimeUnit>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum MissingFlag {
+    /// Stop and say where
+    Error,
+    /// Split the recording at every one
+    Split,
+    /// Interpolate all
+    Interpolate,
+}
+
+fn time_unit(text: &str) -> Result<TimeUnit, String> {
+    TimeUnit::parse(text).ok_or_else(|| "it is one of s, ms, us, ns, min, h and d".to_owned())
+}
+
+/// Says on standard error what was recognised in a file, unless it is plain.
+pub(super) fn tell_reading(name: &str, said: Option<&str>, say: Verbosity) {
+    if let Some(said) = said.filter(|_| !say.quiet) {
+        note(&format!("{name}: {said}\n"));
+    }
 }
 
 impl RoleFlags {
     /// The roles as asked for.
     pub(super) fn roles(self) -> Roles {
         Roles {
-            inputs: self.inputs,
-            outputs: self.outputs,
-            time: self.time,
+            inputs: self.inputs.clone(),
+            outputs: self.outputs.clone(),
+            ..self.rows()
+        }
+    }
+
+    /// How the rows are read, whatever the columns are.
+    fn rows(&self) -> Roles {
+        Roles {
+            time: self.time.clone(),
             sample_time: self.dt,
+            missing: match self.missing {
+                None => Missing::Auto,
+                Some(MissingFlag::Error) => Missing::Error,
+                Some(MissingFlag::Split) => Missing::Split,
+                Some(MissingFlag::Interpolate) => Missing::Interpolate,
+            },
+            resample: self.resample,
+            time_unit: self.time_unit,
+            ..Roles::default()
         }
     }
 
@@ -62,11 +110,11 @@ impl RoleFlags {
                 asked => Ok(asked),
             }
         };
+        let rows = self.rows();
         Ok(Roles {
             inputs: replaced("inputs", self.inputs, inputs)?.or(named.inputs),
             outputs: replaced("outputs", self.outputs, outputs)?.or(named.outputs),
-            time: self.time,
-            sample_time: self.dt,
+            ..rows
         })
     }
 }

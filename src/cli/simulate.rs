@@ -6,12 +6,14 @@ use clap::{Args, ValueEnum};
 use nalgebra::DVector;
 
 use super::output::{Output, check_distinct, note, paths};
-use super::roles::RoleFlags;
+use super::roles::{RoleFlags, tell_reading};
 use super::validate::check_sampling;
 use super::{Outcome, Verbosity};
 use crate::explain::Explanation;
 use crate::identify::{IdentifiedChannel, Model};
-use crate::log::{Channel, Log, RoleNeed, Roles, Source, check_same_sampling, write_table};
+use crate::log::{
+    Channel, Log, Reading, RoleNeed, Roles, Source, check_same_sampling, write_table,
+};
 use crate::report::{is_explanation, parse_explanation, read_model};
 
 const EXAMPLE: &str = "Examples:
@@ -59,7 +61,7 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     let output = Output::check(&flags.output, &paths(&sources))?;
     let name = flags.model.display().to_string();
     if let Some(explanation) = explanation(&flags.model)? {
-        return simulate_explanation(flags, &output, &explanation);
+        return simulate_explanation(flags, &output, &explanation, say);
     }
     if flags.simulation.is_some() {
         anyhow::bail!(
@@ -77,7 +79,7 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     } else {
         RoleNeed::InputsOnly
     };
-    let log = Log::read_with(&flags.input, &roles, need)?;
+    let log = read(&flags.input, &roles, need, say)?;
     check_sampling(&name, &model, &log)?;
     if log.input_data.len() != model.inputs.len() {
         // Roles that need not be there are left out when they are not.
@@ -117,6 +119,13 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
+/// A recording without gaps; what was recognised in it is said.
+fn read(source: &Source, roles: &Roles, need: RoleNeed, say: Verbosity) -> anyhow::Result<Log> {
+    let reading = Reading::read(source, roles, need)?;
+    tell_reading(&source.to_string(), reading.said.as_deref(), say);
+    Ok(reading.whole()?)
+}
+
 /// The explanation in `path`, if that is one; `-` and unreadable files are left to the reader of models.
 fn explanation(path: &Path) -> anyhow::Result<Option<Explanation>> {
     match std::fs::read_to_string(path) {
@@ -131,6 +140,7 @@ fn simulate_explanation(
     flags: Flags,
     output: &Output,
     explanation: &Explanation,
+    say: Verbosity,
 ) -> anyhow::Result<Outcome> {
     let model = &explanation.model;
     let name = flags.model.display().to_string();
@@ -148,7 +158,7 @@ fn simulate_explanation(
     } else {
         RoleNeed::InputsOnly
     };
-    let log = Log::read_with(&flags.input, &roles, need)?;
+    let log = read(&flags.input, &roles, need, say)?;
     check_same_sampling(&name, model.sample_time, &log.name, log.sample_time)?;
     let columns: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
     let start = if estimate {
@@ -168,13 +178,15 @@ fn simulate_explanation(
         Some(file) => {
             let named = Roles {
                 outputs: Some(model.outputs.iter().map(|c| c.name.clone()).collect()),
-                sample_time: roles.sample_time,
-                ..Roles::default()
+                inputs: None,
+                time: None,
+                ..roles.clone()
             };
-            Some(Log::read_with(
+            Some(read(
                 &Source::from(file.clone()),
                 &named,
                 RoleNeed::OutputsOnly,
+                say,
             )?)
         }
         None => None,

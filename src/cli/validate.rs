@@ -7,10 +7,10 @@ use serde::Serialize;
 
 use super::numbers;
 use super::output::{check_distinct, print};
-use super::roles::RoleFlags;
+use super::roles::{RoleFlags, tell_reading};
 use super::{Outcome, Verbosity};
 use crate::identify::{Model, Recording};
-use crate::log::{Log, Source, check_same_sampling};
+use crate::log::{Log, Reading, RoleNeed, Source, check_same_sampling};
 use crate::moments::Detrend;
 use crate::report::text::validation_text;
 use crate::report::{read_model, to_json};
@@ -91,14 +91,24 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     }
     let roles = flags.roles.of_model(&model.inputs, &model.outputs)?;
     let mut logs: Vec<Log> = Vec::with_capacity(flags.logs.len());
+    let mut recordings = Vec::with_capacity(flags.logs.len());
     for source in &flags.logs {
-        let log = Log::read(source, &roles)?;
-        check_sampling(&flags.model.display().to_string(), &model, &log)?;
-        if let Some(first) = logs.first() {
-            // The columns are the same by construction; their units may differ.
-            first.check_same_channels(&log)?;
+        let reading = Reading::read(source, &roles, RoleNeed::Identify)?;
+        tell_reading(&source.to_string(), reading.said.as_deref(), say);
+        recordings.extend(
+            reading
+                .logs
+                .iter()
+                .map(|log| Recording::of_log(log, Some(&reading))),
+        );
+        for log in reading.logs {
+            check_sampling(&flags.model.display().to_string(), &model, &log)?;
+            if let Some(first) = logs.first() {
+                // The columns are the same by construction; their units may differ.
+                first.check_same_channels(&log)?;
+            }
+            logs.push(log);
         }
-        logs.push(log);
     }
     let relation = relation(&model, &logs);
     let zero = match (flags.detrend, relation) {
@@ -119,7 +129,7 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         Format::Json => print(&to_json(&ValidationDocument {
             format: "innovant-validation/1",
             model: flags.model.display().to_string(),
-            recordings: logs.iter().map(recording).collect(),
+            recordings,
             validation: &tests,
         })?)?,
         Format::Text if say.quiet => {}
@@ -158,14 +168,5 @@ fn relation(model: &Model, logs: &[Log]) -> Relation {
         Relation::Estimation
     } else {
         Relation::Fresh
-    }
-}
-
-fn recording(log: &Log) -> Recording {
-    Recording {
-        name: log.name.clone(),
-        sha256: log.sha256.clone(),
-        samples: log.samples(),
-        start_time: log.start_time,
     }
 }

@@ -142,12 +142,7 @@ impl Answer<'_> {
             recordings: self
                 .recordings
                 .iter()
-                .map(|log| Recording {
-                    name: log.name.clone(),
-                    sha256: log.sha256.clone(),
-                    samples: log.samples(),
-                    start_time: log.start_time,
-                })
+                .map(|log| Recording::of_log(log, None))
                 .collect(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };

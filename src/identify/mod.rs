@@ -74,7 +74,7 @@ pub use options::{CovarianceKind, Options, Order, Polish};
 pub use order::OrderEvidence;
 pub use pbsid_opt::{Decomposition, Estimate, Weight, decompose, system_matrices};
 pub use polish::{Effort, Polished, coefficient_cost, polish, predictor_coefficients};
-pub use records::{FileRecords, MemoryRecords, ReadProgress, Recording, Records};
+pub use records::{FileRecords, MemoryRecords, ReadProgress, Recording, Records, on_files};
 pub use reduced::{ReducedRecords, SAMPLES_KEPT};
 pub use resolution::CoarseChannel;
 pub use source::Source;

@@ -1,8 +1,9 @@
 //! Where the samples come from: memory, or files that are streamed.
 
+use super::error::IdentifyError;
 use super::reduced::ReducedRecords;
 use crate::log::{
-    Block, Channel, Log, LogError, LogReader, LogSummary, RoleNeed, Roles, Source,
+    Block, Channel, Log, LogError, LogReader, LogSummary, Reading, RoleNeed, Roles, Source,
     check_same_channels, check_same_sampling,
 };
 
@@ -23,6 +24,26 @@ pub struct Recording {
     pub samples: usize,
     /// Time of the first sample in seconds.
     pub start_time: f64,
+    /// Date and time at second zero, when the time column has dates.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin: Option<String>,
+    /// What was recognised and repaired when the file was read; nothing for a plain file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reading: Option<String>,
+}
+
+impl Recording {
+    /// A log as it is, and what is known of how it was read.
+    pub fn of_log(log: &Log, of: Option<&Reading>) -> Self {
+        Self {
+            name: log.name.clone(),
+            sha256: log.sha256.clone(),
+            samples: log.samples(),
+            start_time: log.start_time,
+            origin: of.and_then(|reading| Some(reading.origin?.to_string())),
+            reading: of.and_then(|reading| reading.said.clone()),
+        }
+    }
 }
 
 /// Recordings of one plant that can be read more than once.
@@ -63,6 +84,7 @@ pub trait Records {
 #[derive(Debug)]
 pub struct MemoryRecords<'a> {
     logs: &'a [Log],
+    recordings: Vec<Recording>,
 }
 
 impl<'a> MemoryRecords<'a> {
@@ -79,8 +101,60 @@ impl<'a> MemoryRecords<'a> {
         for other in &logs[1..] {
             first.check_same_kind(other)?;
         }
-        Ok(Self { logs })
+        let recordings = logs
+            .iter()
+            .map(|log| Recording::of_log(log, None))
+            .collect();
+        Ok(Self { logs, recordings })
     }
+
+    /// With what is known of the recordings beside their samples, one a log.
+    fn with_recordings(self, recordings: Vec<Recording>) -> Self {
+        Self { recordings, ..self }
+    }
+}
+
+/// Runs `work` on recordings that are streamed from files; where a file is not plain, again on what [`Reading`] makes of
+/// them in memory. With the result come the recordings that were not plain, as they were read.
+///
+/// # Errors
+/// What is wrong with a file, or what `work` says.
+pub fn on_files<T>(
+    sources: &[Source],
+    roles: &Roles,
+    progress: Option<ReadProgress<'_>>,
+    work: &mut dyn FnMut(&mut dyn Records) -> Result<T, IdentifyError>,
+) -> Result<(T, Vec<(String, String)>), IdentifyError> {
+    if roles.resample.is_none() {
+        let opened = FileRecords::open(sources.to_vec(), roles.clone());
+        let done = opened.map_err(IdentifyError::from).and_then(|mut records| {
+            if let Some(progress) = progress {
+                records = records.with_progress(progress);
+            }
+            work(&mut records)
+        });
+        match done {
+            Err(IdentifyError::Log(error))
+                if error.is_of_content() && sources.iter().all(Source::can_be_reopened) => {}
+            done => return Ok((done?, Vec::new())),
+        }
+    }
+    let (mut logs, mut recordings, mut said) = (Vec::new(), Vec::new(), Vec::new());
+    for source in sources {
+        let reading = Reading::read(source, roles, RoleNeed::Identify)?;
+        if let Some(text) = &reading.said {
+            said.push((source.to_string(), text.clone()));
+        }
+        recordings.extend(
+            reading
+                .logs
+                .iter()
+                .map(|log| Recording::of_log(log, Some(&reading))),
+        );
+        logs.extend(reading.logs);
+    }
+    let mut records = MemoryRecords::new(&logs)?.with_recordings(recordings);
+    Ok((work(&mut records)?, said))
 }
 
 impl Records for MemoryRecords<'_> {
@@ -101,15 +175,7 @@ impl Records for MemoryRecords<'_> {
     }
 
     fn recordings(&self) -> Vec<Recording> {
-        self.logs
-            .iter()
-            .map(|log| Recording {
-                name: log.name.clone(),
-                sha256: log.sha256.clone(),
-                samples: log.samples(),
-                start_time: log.start_time,
-            })
-            .collect()
+        self.recordings.clone()
     }
 
     fn kept_samples(&self, experiment: usize) -> usize {
@@ -245,6 +311,8 @@ impl Records for FileRecords<'_> {
                 sha256: Some(s.sha256.clone()),
                 samples: s.samples,
                 start_time: s.start_time,
+                origin: None,
+                reading: None,
             })
             .collect()
     }

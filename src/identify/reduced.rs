@@ -317,6 +317,8 @@ impl Records for ReducedRecords {
                 sha256: None,
                 samples: e.samples,
                 start_time: e.start_time,
+                origin: None,
+                reading: None,
             })
             .collect()
     }

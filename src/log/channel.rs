@@ -5,6 +5,8 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::unit::is_unit;
+
 /// One signal: its name and, where the header says so, its unit.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 pub struct Channel {
@@ -24,14 +26,21 @@ impl Channel {
         }
     }
 
-    /// Reads a header: `force [N]` is `force` in `N`; a header without a bracketed ending is all name.
+    /// Reads a header: `force [N]` and `force (N)` are `force` in `N`; a header without such an ending is all name. What
+    /// stands in parentheses and is no unit, as in `speed (filtered)`, is part of the name.
     ///
     /// Nothing is refused: `[N]` alone has no name, so the whole of it is the name.
     pub fn parse(header: &str) -> Self {
         let header = header.trim();
         let split = header
             .strip_suffix(']')
-            .and_then(|open| open.rsplit_once('['));
+            .and_then(|open| open.rsplit_once('['))
+            .or_else(|| {
+                let open = header.strip_suffix(')')?;
+                open.match_indices('(')
+                    .filter_map(|(at, _)| Some((open.get(..at)?, open.get(at + 1..)?)))
+                    .find(|(_, unit)| is_unit(unit))
+            });
         match split.map(|(name, unit)| (name.trim(), unit.trim())) {
             Some((name, unit)) if !name.is_empty() => Self {
                 name: name.to_owned(),

@@ -280,6 +280,46 @@ pub enum LogError {
         sample_time: f64,
         recipe: Box<str>,
     },
+    /// Several rows share a time stamp, not always as many.
+    #[error(
+        "{name}, column `{column}`: time stamps are only to {resolution} s, and between {least} and {most} rows share one, so \
+         the time of a row cannot be told; log stamps with more digits, or pass `--dt S` when the rows are evenly spaced"
+    )]
+    CoarseStamps {
+        name: String,
+        column: String,
+        resolution: f64,
+        least: usize,
+        most: usize,
+    },
+    /// `--dt` and the time column do not agree.
+    #[error(
+        "{name}, column `{column}`: its step is {found} s, and --dt says {asked} s; leave --dt out, or say what the column \
+         is: `--time-unit ms` for another unit, `--time none` when it is no time"
+    )]
+    SampleTimeContradicted {
+        name: String,
+        column: String,
+        found: f64,
+        asked: f64,
+    },
+    /// So many samples are missing that nothing is left between them.
+    #[error(
+        "{name}: nothing is left between missing samples: {missing}; `--missing interpolate` fills them all, and \
+         `--resample S` reads the recording at the rate of its slowest column"
+    )]
+    NothingLeft { name: String, missing: String },
+    /// A recording in several parts where one is needed.
+    #[error(
+        "{name}: samples are missing ({said}), and one recording without gaps is needed here; cut the file there, or fill \
+         them with `--missing interpolate`"
+    )]
+    InParts { name: String, said: String },
+    /// What the plain reader leaves to the one that looks at the whole file.
+    #[error(
+        "{name}: column `{column}` holds dates, or time in another unit than seconds; read the file as a whole"
+    )]
+    Dated { name: String, column: String },
     /// The sample time asked for is zero, negative or not finite.
     #[error(
         "the sample time must be a positive number of seconds, between 1e-18 and 1e18, found {sample_time}; for example \
@@ -383,6 +423,15 @@ impl LogError {
                 | Self::Limit(_)
                 | Self::Write { .. }
         )
+    }
+
+    /// Whether another way of reading the same bytes may understand them.
+    pub(crate) fn is_of_content(&self) -> bool {
+        !self.is_of_system()
+            && !matches!(
+                self,
+                Self::BrokenGzip { .. } | Self::InvalidSampleTime { .. }
+            )
     }
 
     /// Whether the reader of our standard output has gone (`innovant ... | head`): success for a command line.

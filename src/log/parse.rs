@@ -160,7 +160,7 @@ impl RowParser {
         split(line, self.header.separator, &mut self.fields);
         let (expected, found) = (self.slots.len(), self.fields.len());
         if expected != found {
-            let hint = self.ragged_hint(line, cut_off);
+            let hint = self.ragged_hint(line, cut_off, found);
             return Err(LogError::RaggedRow {
                 name: name(),
                 line: number,
@@ -185,8 +185,21 @@ impl RowParser {
         Ok(true)
     }
 
-    fn ragged_hint(&self, line: &[u8], cut_off: bool) -> &'static str {
-        let (expected, found) = (self.slots.len(), self.fields.len());
+    /// The error of a line with another number of fields than the header; `cut_off`: the file ends in it.
+    pub(super) fn ragged(&self, line: &str, number: u64, cut_off: bool) -> LogError {
+        let mut fields = Vec::new();
+        split(line.as_bytes(), self.header.separator, &mut fields);
+        LogError::RaggedRow {
+            name: self.header.name.clone(),
+            line: number,
+            expected: self.slots.len(),
+            found: fields.len(),
+            hint: self.ragged_hint(line.as_bytes(), cut_off, fields.len()),
+        }
+    }
+
+    fn ragged_hint(&self, line: &[u8], cut_off: bool, found: usize) -> &'static str {
+        let expected = self.slots.len();
         if cut_off && found < expected {
             "; the file ends in the middle of this line: delete it"
         } else if self.header.separator == b',' && found == 2 * expected {
@@ -200,7 +213,7 @@ impl RowParser {
         }
     }
 
-    fn bad_cell(&self, cell: &[u8], line: u64, index: usize) -> LogError {
+    pub(super) fn bad_cell(&self, cell: &[u8], line: u64, index: usize) -> LogError {
         let (name, column, text) = (
             self.header.name.clone(),
             self.header.column(index),

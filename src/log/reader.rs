@@ -7,9 +7,10 @@ use super::error::LogError;
 use super::header::Header;
 use super::lines::Lines;
 use super::parse::RowParser;
-use super::roles::{RoleNeed, Roles, assign};
-use super::sampling::{Sampling, seconds};
+use super::roles::{RoleNeed, Roles, TimeUnit, assign};
+use super::sampling::Sampling;
 use super::source::{Source, Stream};
+use super::stamps::first_look;
 
 /// Rows in a block; only the last of a recording has fewer.
 pub const BLOCK_ROWS: usize = 16_384;
@@ -106,6 +107,9 @@ impl LogReader {
         let header = Header::read(&mut lines).map_err(|error| lines.damage().unwrap_or(error));
         let header = header?;
         let assigned = assign(roles, need, &header)?;
+        if let Some(index) = assigned.time {
+            first_look(&header, index, lines.chunk()?.0, roles)?;
+        }
         let mut slots = vec![None; header.channels.len()];
         let channels = assigned.inputs.iter().chain(&assigned.outputs);
         for (slot, column) in channels
@@ -125,7 +129,7 @@ impl LogReader {
         let (inputs, outputs) = (named(&assigned.inputs), named(&assigned.outputs));
         let stamped = assigned.time.filter(|_| roles.sample_time.is_none());
         let sampling = stamped
-            .map(|index| time_base(&header, index, lines.next_line()))
+            .map(|index| time_base(&header, index, lines.next_line(), roles.time_unit))
             .transpose()?;
         Ok(Self {
             lines,
@@ -294,20 +298,33 @@ pub(super) fn time_base(
     header: &Header,
     index: usize,
     first_line: u64,
+    asked: Option<TimeUnit>,
 ) -> Result<Sampling, LogError> {
-    let unit = header
-        .channels
-        .get(index)
-        .and_then(|channel| channel.unit.as_deref());
-    let Some(scale) = seconds(unit) else {
-        let (name, column) = (header.name.clone(), header.column(index));
-        return Err(LogError::TimeUnit {
-            name,
-            column,
-            unit: unit.unwrap_or_default().to_owned(),
-        });
-    };
+    let scale = time_unit(header, index, asked)?.seconds();
     Ok(Sampling::new(header, index, scale, first_line))
+}
+
+/// Unit of the time column: as asked for, by its header, by the end of its name, or seconds.
+pub(super) fn time_unit(
+    header: &Header,
+    index: usize,
+    asked: Option<TimeUnit>,
+) -> Result<TimeUnit, LogError> {
+    let channel = header.channels.get(index);
+    let unit = channel.and_then(|channel| channel.unit.as_deref());
+    if let Some(asked) = asked {
+        return Ok(asked);
+    }
+    match unit {
+        Some(unit) => TimeUnit::parse(unit).ok_or_else(|| LogError::TimeUnit {
+            name: header.name.clone(),
+            column: header.column(index),
+            unit: unit.to_owned(),
+        }),
+        None => Ok(channel
+            .and_then(|channel| TimeUnit::of_name(&channel.name))
+            .unwrap_or(TimeUnit::Seconds)),
+    }
 }
 
 /// Whether an experiment called `name` has the channels `found` where the one called `first` has `expected`, in the

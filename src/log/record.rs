@@ -6,6 +6,7 @@ use std::path::Path;
 use super::channel::Channel;
 use super::error::LogError;
 use super::reader::{Block, LogReader, check_same_channels, check_same_sampling};
+use super::reading::Reading;
 use super::roles::{RoleNeed, Roles};
 use super::sampling::is_sample_time;
 use super::source::Source;
@@ -70,10 +71,10 @@ impl Log {
         channels.map(Vec::as_slice).collect()
     }
 
-    /// Reads a recording with at least one input and one output.
+    /// Reads a recording with at least one input and one output; [`Reading`] has what was recognised and repaired.
     ///
     /// # Errors
-    /// Whatever is wrong with the file: see [`LogError`].
+    /// Whatever is wrong with the file: see [`LogError`]; also that it is in several parts.
     pub fn read(source: &Source, roles: &Roles) -> Result<Self, LogError> {
         Self::read_with(source, roles, RoleNeed::Identify)
     }
@@ -83,7 +84,7 @@ impl Log {
     /// # Errors
     /// As [`Log::read`].
     pub fn read_with(source: &Source, roles: &Roles, need: RoleNeed) -> Result<Self, LogError> {
-        Self::collect(LogReader::open(source, roles, need)?)
+        Reading::read(source, roles, need)?.whole()
     }
 
     /// As [`Log::read`], of bytes in memory; `name` stands for the file in messages.
@@ -95,12 +96,12 @@ impl Log {
         reader: impl Read + Send + 'static,
         roles: &Roles,
     ) -> Result<Self, LogError> {
-        Self::collect(LogReader::from_reader(
-            name,
-            reader,
-            roles,
-            RoleNeed::Identify,
-        )?)
+        Reading::from_reader(name, reader, roles, RoleNeed::Identify)?.whole()
+    }
+
+    /// A plain file, from its reader.
+    pub(super) fn of_plain(reader: LogReader) -> Result<Self, LogError> {
+        Self::collect(reader)
     }
 
     /// Reads all blocks that are left in `reader`, which should be at its start.

@@ -9,6 +9,8 @@ use super::sampling::is_sample_time;
 
 /// What the user asked for: `--inputs`, `--outputs`, `--time`, `--dt`. The default leaves all to the headers.
 ///
+/// How the rows are read beside that: `--missing`, `--resample`, `--time-unit`.
+///
 /// A name matches a header with or without the unit in brackets (`force` finds `force [N]`), with the same case if it
 /// can be, in any case if only one column fits. What is not asked for goes by the header: u or U starts an input, y or
 /// Y an output, `t` or `time` is the time.
@@ -20,9 +22,105 @@ pub struct Roles {
     pub outputs: Option<Vec<String>>,
     /// The time column; seconds, unless the header says `[ms]`, `[us]`, `[ns]`, `[min]` or `[h]`.
     pub time: Option<String>,
-    /// Sample time in seconds; when given, the time column is not read.
+    /// Sample time in seconds; when given, rows follow each other at it, and the time column may not contradict it.
     pub sample_time: Option<f64>,
+    /// What is done about samples that are missing.
+    #[serde(skip_serializing_if = "Missing::is_auto")]
+    pub missing: Missing,
+    /// Sample time in seconds of a uniform grid that the rows are put on, without aliases.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resample: Option<f64>,
+    /// Unit of the time column, whatever its header says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_unit: Option<TimeUnit>,
 }
+
+/// What is done about samples that are missing: rows that are not there, cells that are empty or NaN.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Missing {
+    /// Up to two in a row are interpolated, at more the recording is split into several.
+    #[default]
+    Auto,
+    /// An error.
+    Error,
+    /// The recording is split at every one.
+    Split,
+    /// All are interpolated.
+    Interpolate,
+}
+
+impl Missing {
+    fn is_auto(&self) -> bool {
+        *self == Self::Auto
+    }
+}
+
+/// Unit of a time column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[allow(missing_docs, reason = "the names say it")]
+#[serde(rename_all = "lowercase")]
+pub enum TimeUnit {
+    Seconds,
+    Milliseconds,
+    Microseconds,
+    Nanoseconds,
+    Minutes,
+    Hours,
+    Days,
+}
+
+impl TimeUnit {
+    /// Seconds in the unit.
+    pub fn seconds(self) -> f64 {
+        match self {
+            Self::Seconds => 1.0,
+            Self::Milliseconds => 1e-3,
+            Self::Microseconds => 1e-6,
+            Self::Nanoseconds => 1e-9,
+            Self::Minutes => 60.0,
+            Self::Hours => 3600.0,
+            Self::Days => 86_400.0,
+        }
+    }
+
+    /// The unit by the sign that a header or a flag has for it.
+    pub fn parse(text: &str) -> Option<Self> {
+        Some(match text.trim().to_lowercase().as_str() {
+            "s" | "sec" | "secs" | "second" | "seconds" => Self::Seconds,
+            "ms" | "msec" | "millis" | "milliseconds" => Self::Milliseconds,
+            "us" | "µs" | "μs" | "usec" | "micros" | "microseconds" => Self::Microseconds,
+            "ns" | "nsec" | "nanos" | "nanoseconds" => Self::Nanoseconds,
+            "min" | "mins" | "minute" | "minutes" => Self::Minutes,
+            "h" | "hr" | "hrs" | "hour" | "hours" => Self::Hours,
+            "d" | "day" | "days" => Self::Days,
+            _ => return None,
+        })
+    }
+
+    /// The unit at the end of a name: `time_ms`, `t_sec`, `epoch_ns`.
+    pub(super) fn of_name(name: &str) -> Option<Self> {
+        let (_, last) = name.rsplit_once(['_', '-', '.'])?;
+        Self::parse(last)
+    }
+}
+
+impl std::fmt::Display for TimeUnit {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Seconds => "s",
+            Self::Milliseconds => "ms",
+            Self::Microseconds => "us",
+            Self::Nanoseconds => "ns",
+            Self::Minutes => "min",
+            Self::Hours => "h",
+            Self::Days => "d",
+        })
+    }
+}
+
+/// What `--time` says when no column is to be read as the time.
+pub(super) const NO_TIME: &str = "none";
 
 impl Roles {
     /// Inputs and outputs by name, as a model names them.
@@ -33,6 +131,13 @@ impl Roles {
             outputs: names(outputs),
             ..Self::default()
         }
+    }
+}
+
+impl Roles {
+    /// Whether no column is to be the time: `--time none`, unless a column is called so.
+    fn is_timeless(&self, header: &Header) -> Result<bool, LogError> {
+        Ok(self.time.as_deref() == Some(NO_TIME) && find(header, NO_TIME)?.is_none())
     }
 }
 
@@ -63,9 +168,11 @@ pub(super) fn assign(roles: &Roles, need: RoleNeed, header: &Header) -> Result<A
     if let Some(sample_time) = roles.sample_time.filter(|dt| !is_sample_time(*dt)) {
         return Err(LogError::InvalidSampleTime { sample_time });
     }
+    let timeless = roles.is_timeless(header)?;
     let asked_time = roles
         .time
         .as_deref()
+        .filter(|_| !timeless)
         .map(|asked| known(header, asked))
         .transpose()?;
     let wants_inputs = need != RoleNeed::OutputsOnly;
@@ -90,7 +197,7 @@ pub(super) fn assign(roles: &Roles, need: RoleNeed, header: &Header) -> Result<A
         .chain(inputs.iter().flatten().copied())
         .chain(outputs.iter().flatten().copied())
         .collect();
-    let time = asked_time.or_else(|| default_time(header, &taken));
+    let time = asked_time.or_else(|| default_time(header, &taken).filter(|_| !timeless));
     let free = |index: &usize| !taken.contains(index) && Some(*index) != time;
     let starting_with = |letters: [char; 2]| -> Vec<usize> {
         let starts = |index: &usize| {
@@ -263,7 +370,8 @@ fn find(header: &Header, asked: &str) -> Result<Option<usize>, LogError> {
     Ok(None)
 }
 
-/// `t`, else `time` in any case, else `T` (which is more often a temperature), with or without a unit.
+/// `t`, else `time` in any case, else another usual name of it, else `T` (which is more often a temperature), with or
+/// without a unit.
 fn default_time(header: &Header, taken: &[usize]) -> Option<usize> {
     if header.headerless {
         return None;
@@ -277,7 +385,28 @@ fn default_time(header: &Header, taken: &[usize]) -> Option<usize> {
     };
     named(&|name| name == "t")
         .or_else(|| named(&|name| name.eq_ignore_ascii_case("time")))
+        .or_else(|| named(&is_usual_time))
         .or_else(|| named(&|name| name == "T"))
+}
+
+/// `Time_s`, `timestamp`, `epoch_ms`, `Zeit` and the like.
+fn is_usual_time(name: &str) -> bool {
+    let bare = match TimeUnit::of_name(name) {
+        Some(_) => name
+            .rsplit_once(['_', '-', '.'])
+            .map_or(name, |(bare, _)| bare),
+        None => name,
+    };
+    let word: String = bare
+        .to_lowercase()
+        .chars()
+        .filter(|c| c.is_alphanumeric())
+        .collect();
+    (bare != name && (word == "t" || word == "time"))
+        || matches!(
+            word.as_str(),
+            "timestamp" | "datetime" | "zeit" | "zeitstempel" | "epoch" | "unixtime"
+        )
 }
 
 /// Most bytes of names in an example of what to type.

@@ -16,9 +16,9 @@ pub fn is_sample_time(seconds: f64) -> bool {
 }
 
 /// How far one step may be off, relative to the sample time.
-const STEP_TOLERANCE: f64 = 0.01;
+pub(super) const STEP_TOLERANCE: f64 = 0.01;
 /// A step beyond this many sample times means that samples are missing.
-const GAP: f64 = 1.5;
+pub(super) const GAP: f64 = 1.5;
 /// How far time may run away from a uniform grid, relative to the length of the record; also half a sample is always
 /// allowed. A clock disciplined by NTP (slewed by 5e-4 for half of the record) bends by 1.25e-4.
 const DRIFT_TOLERANCE: f64 = 2e-4;
@@ -28,19 +28,6 @@ const ROUNDING: f64 = 1e-9;
 const FIRST_STEPS: usize = 1023;
 /// Time stamps kept, evenly spread, for the check of drift.
 const MARKS: usize = 2048;
-
-/// Seconds in a unit of time; `None` for a unit that is not known.
-pub(super) fn seconds(unit: Option<&str>) -> Option<f64> {
-    Some(match unit {
-        None | Some("s" | "sec" | "secs" | "second" | "seconds" | "S") => 1.0,
-        Some("ms" | "msec") => 1e-3,
-        Some("us" | "µs" | "μs" | "usec") => 1e-6,
-        Some("ns" | "nsec") => 1e-9,
-        Some("min" | "minutes") => 60.0,
-        Some("h" | "hr" | "hours") => 3600.0,
-        Some(_) => return None,
-    })
-}
 
 /// Follows the time stamps of a recording as they come.
 #[derive(Debug)]
@@ -257,6 +244,31 @@ impl Sampling {
     }
 }
 
+/// Holds stamps against the grid through the middle of them: the row that is off the most, and the time it should have.
+pub(super) fn check_drift(samples: &[usize], times: &[f64], step: f64) -> Result<(), (usize, f64)> {
+    let (Some(first), Some(last)) = (times.first(), times.last()) else {
+        return Ok(());
+    };
+    let phases = || {
+        samples
+            .iter()
+            .zip(times)
+            .map(|(k, t)| t - first - *k as f64 * step)
+    };
+    let phase = phases().sum::<f64>() / times.len() as f64;
+    let worst = phases()
+        .map(|p| (p - phase).abs())
+        .enumerate()
+        .max_by(|a, b| a.1.total_cmp(&b.1));
+    match worst {
+        Some((at, off)) if off > (0.5 * step).max(DRIFT_TOLERANCE * (last - first)) => {
+            let sample = samples.get(at).copied().unwrap_or(0) as f64;
+            Err((at, first + phase + sample * step))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The commands that split a file before `line`.
 fn split_recipe(header: &Header, line: u64) -> String {
     let file = &header.name;
@@ -284,7 +296,7 @@ fn median_step(times: impl Iterator<Item = f64>) -> Option<f64> {
 
 /// The decimal with the fewest digits within `tolerance` of `value`: the sample time that was meant, rather than one
 /// with the rounding of the last time stamp in its sixteenth digit.
-fn shortest_within(value: f64, tolerance: f64) -> f64 {
+pub(super) fn shortest_within(value: f64, tolerance: f64) -> f64 {
     let rounded = |digits: usize| format!("{value:.digits$e}").parse::<f64>().ok();
     (0..16)
         .filter_map(rounded)
@@ -293,6 +305,6 @@ fn shortest_within(value: f64, tolerance: f64) -> f64 {
 }
 
 /// A value as a message shows it, to nine digits.
-fn readable(value: f64) -> f64 {
+pub(super) fn readable(value: f64) -> f64 {
     shortest_within(value, 1e-9 * value.abs())
 }

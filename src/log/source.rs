@@ -6,11 +6,57 @@ use std::fs::{self, File};
 use std::io::{self, BufReader, Chain, Cursor, Read};
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::sync::Mutex;
 
 use flate2::bufread::MultiGzDecoder;
 use sha2::{Digest, Sha256};
 
 use super::error::LogError;
+
+/// What was read of standard input, of which there is one in a process, to be read again; `None` once it is too much.
+static HEAD: Mutex<Option<Vec<u8>>> = Mutex::new(Some(Vec::new()));
+
+/// Bytes of standard input that are kept. A longer recording is streamed, and what takes a second look at it asks for a
+/// file.
+const KEPT: usize = 32 << 20;
+
+/// Standard input from its start; keeps what it reads.
+struct Again {
+    /// What was read before and is given out first.
+    known: Cursor<Vec<u8>>,
+}
+
+impl Again {
+    /// `None` when the start is gone.
+    fn new() -> Option<Self> {
+        let head = HEAD.lock().ok()?.clone()?;
+        Some(Self {
+            known: Cursor::new(head),
+        })
+    }
+}
+
+impl Read for Again {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.known.read(buffer)?;
+        if count > 0 || buffer.is_empty() {
+            return Ok(count);
+        }
+        let count = io::stdin().read(buffer)?;
+        if let Ok(mut head) = HEAD.lock() {
+            if head
+                .as_ref()
+                .is_some_and(|bytes| bytes.len() + count > KEPT)
+            {
+                *head = None;
+            }
+            if let (Some(bytes), Some(fresh)) = (head.as_mut(), buffer.get(..count)) {
+                bytes.extend_from_slice(fresh);
+            }
+        }
+        Ok(count)
+    }
+}
 
 /// A file, or standard input.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -70,6 +116,14 @@ impl Source {
         }
     }
 
+    /// Whether all of it can be read from its start, once a first reading went some way.
+    pub(crate) fn can_be_reopened(&self) -> bool {
+        match self {
+            Self::Stdin => HEAD.lock().is_ok_and(|head| head.is_some()),
+            Self::Path(_) => self.can_be_read_again(),
+        }
+    }
+
     /// Opens the source and looks at its first two bytes.
     pub(super) fn open(&self) -> Result<Stream, LogError> {
         let failed = |source| LogError::Open {
@@ -77,7 +131,12 @@ impl Source {
             source,
         };
         match self {
-            Self::Stdin => Stream::new(Box::new(io::stdin()), false, None).map_err(failed),
+            Self::Stdin => {
+                let again = Again::new().ok_or_else(|| LogError::ReadOnce {
+                    name: self.to_string(),
+                })?;
+                Stream::new(Box::new(again), false, None).map_err(failed)
+            }
             Self::Path(path) => {
                 let file = File::open(path).map_err(failed)?;
                 let about = file.metadata().map_err(failed)?;

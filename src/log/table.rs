@@ -44,7 +44,7 @@ impl TableRoles {
 /// [`LogError`] when the unit is not known or the stamps are not uniform.
 pub fn time_base_of(name: &str, column: &str, stamps: &[f64]) -> Result<(f64, f64), LogError> {
     let header = header(name, &[column.to_owned()]);
-    let mut sampling = time_base(&header, 0, 1)?;
+    let mut sampling = time_base(&header, 0, 1, None)?;
     sampling.push(&header, stamps)?;
     sampling.finish(&header)
 }

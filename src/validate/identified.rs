@@ -58,12 +58,22 @@ pub fn test_residuals(mut model: Model, deviations: &[Deviations]) -> TestedMode
     }
 }
 
+/// Which part of a file a recording is, as [`crate::log::Reading`] names them.
+fn part_of(name: &str) -> Option<&str> {
+    name.rsplit_once(" [part ").map(|(_, part)| part)
+}
+
 /// Two files may be copies of one.
 fn check_recorded_once(model: &Model) -> Result<(), IdentifyError> {
     for (index, recording) in model.recordings.iter().enumerate() {
         let copy = model.recordings[..index]
             .iter()
-            .find(|other| other.sha256.is_some() && other.sha256 == recording.sha256);
+            // Parts of one file have one hash, and differ in which part they are.
+            .find(|other| {
+                other.sha256.is_some()
+                    && other.sha256 == recording.sha256
+                    && part_of(&other.name) == part_of(&recording.name)
+            });
         if let Some(copy) = copy {
             return Err(IdentifyError::SameRecording {
                 first: copy.name.clone(),

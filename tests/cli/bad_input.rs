@@ -54,9 +54,12 @@ fn cells_and_rows() {
             "correct the cell",
         ],
     );
-    let nan = about(&with_row(57, "0.055,1,NaN"), &[]);
-    says(&nan, &["log.csv, line 57, column `y1`", "interpolate"]);
-    let empty = about(&with_row(57, "0.055,,1"), &[]);
+    let infinite = about(&with_row(57, "0.055,1,inf"), &[]);
+    says(&infinite, &["log.csv, line 57, column `y1`", "interpolate"]);
+    let strict = ["--missing", "error"];
+    let nan = about(&with_row(57, "0.055,1,NaN"), &strict);
+    says(&nan, &["line 57, column `y1`", "interpolate"]);
+    let empty = about(&with_row(57, "0.055,,1"), &strict);
     says(&empty, &["line 57, column `u1`", "the cell is empty"]);
     let ragged = about(&with_row(57, "0.055,1"), &[]);
     says(&ragged, &["line 57", "2 fields where the header has 3"]);
@@ -118,12 +121,12 @@ fn channels_that_say_nothing() {
 
 #[test]
 fn time_and_length() {
-    let irregular = about(&with_row(57, "0.0552,1,1"), &[]);
+    let irregular = about(&with_row(57, "0.05549,1,1"), &[]);
     says(
         &irregular,
         &["line 57, column `t`", "irregular sampling", "resample"],
     );
-    let backwards = about(&with_row(57, "0.01,1,1"), &[]);
+    let backwards = about(&with_row(57, "0.01,1,1"), &["--missing", "error"]);
     says(&backwards, &["line 57, column `t`", "must increase"]);
     let short = about(rows()[..6].join("\n").as_bytes(), &[]);
     says(&short, &["too short: 5 samples", "longer recording"]);

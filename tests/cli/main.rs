@@ -9,6 +9,7 @@ mod explain;
 mod explain_plants;
 #[path = "../support/folder.rs"]
 mod folder;
+mod formats;
 mod identify;
 mod open_loop_methods;
 mod reference_values;

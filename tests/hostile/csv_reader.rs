@@ -155,6 +155,7 @@ fn roles(bytes: &mut Bytes) -> Roles {
         outputs: bytes.maybe(list),
         time: bytes.maybe(|bytes| bytes.one_of(&names).to_owned()),
         sample_time: bytes.maybe(Bytes::number),
+        ..Roles::default()
     }
 }
 

@@ -165,6 +165,8 @@ impl Records for Pieces<'_> {
             sha256: self.log.sha256.clone(),
             samples: self.log.samples(),
             start_time: self.log.start_time,
+            origin: None,
+            reading: None,
         }]
     }
 

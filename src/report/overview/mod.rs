@@ -42,6 +42,8 @@ pub struct Experiment {
     pub name: String,
     /// Samples.
     pub samples: usize,
+    /// Date and time at second zero, when the recording has dates.
+    pub origin: Option<String>,
     /// A line for each input, `(seconds, value)`: all samples, or smallest and largest of each stretch of them.
     pub inputs: Vec<Vec<(f64, f64)>>,
     /// The same for each output.
@@ -85,6 +87,7 @@ impl<'a> Watched<'a> {
                     .collect(),
                 name: recording.name,
                 samples: recording.samples,
+                origin: recording.origin,
             })
         });
         Overview {

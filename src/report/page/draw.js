@@ -32,6 +32,9 @@
     modeBarButtons: [["zoomIn2d", "zoomOut2d", "resetScale2d"], ["toImage"]],
   };
 
+  // The number of a date as the page or plotly.js writes it; numbers stay.
+  const moment = (v) => (typeof v !== "string" ? v : Date.parse(`${v.replace(" UTC", "").replace(" ", "T").replace(/(\.\d{3})\d*$/, "$1")}Z`));
+
   class Picture {
     constructor(element) {
       this.element = element;
@@ -40,7 +43,21 @@
       this.hidden = new Set();
       this.range = null;
       this.fit = null;
+      this.dated();
       this.legend();
+    }
+
+    // Seconds since a date become milliseconds since 1970, which plotly.js shows as dates.
+    dated() {
+      const { x, series } = this.spec;
+      if (!x.since) return;
+      const zero = moment(x.since);
+      const date = (v) => (v === null ? null : zero + 1000 * v);
+      for (const s of series) {
+        s.x = s.x.map(date);
+        for (const band of s.bands || []) band.x = band.x.map(date);
+      }
+      if (x.range) x.range = x.range.map(date);
     }
 
     legend() {
@@ -135,8 +152,8 @@
       const names = of.names ? { tickmode: "array", tickvals: of.names.map((_, k) => k), ticktext: of.names.map(plain), range: [-0.5, of.names.length - 0.5] } : {};
       const log = (v) => (of.logarithmic ? Math.log10(v) : v);
       return {
-        type: of.logarithmic ? "log" : "linear", gridcolor: colour("grid"), zerolinecolor: colour("hair"), linecolor: colour("soft"),
-        tickfont: { size: 11.5, color: colour("soft") }, exponentformat: "power", minexponent: 4, hoverformat: ".5~g", automargin: true,
+        type: of.since ? "date" : of.logarithmic ? "log" : "linear", gridcolor: colour("grid"), zerolinecolor: colour("hair"), linecolor: colour("soft"),
+        tickfont: { size: 11.5, color: colour("soft") }, exponentformat: "power", minexponent: 4, hoverformat: of.since ? "%Y-%m-%d %H:%M:%S.%3f" : ".5~g", automargin: true,
         ...(of.logarithmic ? this.decades(of) : {}), ...(of.whole ? { tickformat: "d" } : {}),
         ...(of.names ? { zeroline: false, showgrid: false } : {}), ...names,
         ...(range ? { range: [...range] } : of.range ? { range: of.range.map(log) } : {}),
@@ -216,7 +233,7 @@
       m.linked = true;
       m.moved = (change) => {
         const ends = [change["xaxis.range[0]"], change["xaxis.range[1]"]];
-        const range = change["xaxis.range"] || (ends[0] === undefined ? null : ends);
+        const range = (change["xaxis.range"] || (ends[0] === undefined ? null : ends))?.map(moment);
         if (range && !m.spec.x.logarithmic) show(range);
         else if (change["xaxis.autorange"] || m.range) show(null);
       };

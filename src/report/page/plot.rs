@@ -83,6 +83,9 @@ pub(in crate::report) struct Axis {
     /// Values are counts: no fractions on the axis.
     #[serde(skip_serializing_if = "is_false")]
     whole: bool,
+    /// Date and time at zero, when values are seconds that are to be shown as dates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    since: Option<String>,
 }
 
 /// How a series is drawn.
@@ -187,6 +190,18 @@ impl Axis {
         Self {
             whole: true,
             ..self
+        }
+    }
+
+    /// The same for seconds since a date, which are shown as dates; without one, as they are.
+    pub(in crate::report) fn since(self, date: Option<&str>) -> Self {
+        match date {
+            Some(date) => Self {
+                since: Some(date.to_owned()),
+                unit: String::new(),
+                ..self
+            },
+            None => self,
         }
     }
 

@@ -63,11 +63,12 @@ fn channels(of: &Experiment, model: &Model) -> Vec<Plot> {
         .map(|(c, line)| (c, line, "output"));
     inputs
         .chain(outputs)
-        .map(|(channel, line, role)| over_time(&channel.channel, line, role, of.samples))
+        .map(|(channel, line, role)| over_time(&channel.channel, line, role, of))
         .collect()
 }
 
-fn over_time(channel: &Channel, line: &[(f64, f64)], role: &'static str, samples: usize) -> Plot {
+fn over_time(channel: &Channel, line: &[(f64, f64)], role: &'static str, of: &Experiment) -> Plot {
+    let samples = of.samples;
     let low = line.iter().fold(f64::INFINITY, |m, p| m.min(p.1));
     let high = line.iter().fold(f64::NEG_INFINITY, |m, p| m.max(p.1));
     let unit = channel.unit.as_deref().unwrap_or_default();
@@ -86,7 +87,9 @@ fn over_time(channel: &Channel, line: &[(f64, f64)], role: &'static str, samples
         ),
         height: "low",
         drawing: Drawing {
-            x: Axis::new("time", "s").spanning(line.iter().map(|p| p.0)),
+            x: Axis::new("time", "s")
+                .spanning(line.iter().map(|p| p.0))
+                .since(of.origin.as_deref()),
             y: Axis::new(&channel.name, unit).over([low, high]),
             series: vec![Series::line(&channel.name, role, line.iter().copied())],
             ..Drawing::default()
