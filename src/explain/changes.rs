@@ -28,10 +28,9 @@ impl Answer<'_> {
     /// What differs between the plant of the simulation and that of the model that stands.
     pub(crate) fn parameter_changes(&self, problem: &Problem, model: &Fit) -> Vec<ParameterChange> {
         let structure = &model.structure;
-        // A plant of another class, or of another order, has nothing to compare with.
+        // A plant of another class has nothing to compare with.
         let known = &self.known.structure;
-        let same = structure.states() == known.states() && !structure.is_tanks();
-        if !same || !(structure.plant_free || structure.adjusted > 0) {
+        if structure.is_tanks() || !(structure.plant_free || structure.adjusted > 0) {
             return Vec::new();
         }
         let before = self.properties(&known.plant(&known.given()));

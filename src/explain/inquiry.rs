@@ -312,7 +312,7 @@ fn output_error_refit(problem: &Problem) -> Option<Structure> {
     if data.signals() != 1 || data.outputs != 1 || !data.constant {
         return None;
     }
-    let (plant, _) = super::rebaseline::rebaseline(data, 0)?;
+    let plant = super::rebaseline::rebaseline(data)?;
     let (initial, _) = super::baseline::initial_states(&plant, data)?;
     Some(Structure {
         plant_free: true,

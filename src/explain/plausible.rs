@@ -3,6 +3,8 @@
 #[cfg(test)]
 mod tests;
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -106,6 +108,10 @@ pub(crate) fn add_free_twins(
         .filter(|r| {
             let e = &r.fit.structure.new_effects()[0];
             !r.fit.structure.plant_free
+                && Arc::ptr_eq(
+                    &r.fit.structure.coordinates,
+                    &boring.full.structure.coordinates,
+                )
                 && base - r.criterion > NEEDED
                 && !ranked.iter().any(|o| {
                     o.fit.structure.plant_free && o.fit.structure.new_effects()[0].is_same(e)
@@ -123,7 +129,7 @@ pub(crate) fn add_free_twins(
                 .extend_from_slice(r.fit.structure.new_effects());
             let linear = r.fit.structure.effect_offset(r.fit.structure.first_new());
             let mut theta = full.given();
-            if r.fit.structure.initial_free && full.states() == r.fit.structure.states() {
+            if r.fit.structure.initial_free {
                 let from = full.coordinates.len();
                 let states = full.states() * full.initial.len();
                 theta[from..from + states].copy_from_slice(&r.fit.theta[..states]);

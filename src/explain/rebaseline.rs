@@ -1,9 +1,9 @@
-//! A linear baseline by simulation error, for models that were identified from the very recording.
+//! A linear plant by simulation error: a start for the fit of parameters.
 //!
 //! An identified model predicts one step ahead. On a recording with little noise and a plant that is not linear such a
-//! model may be of high order, unstable or poor in simulation, and what it lacks would be called physics. So its role
-//! is only to say that the plant is taken as linear: order and delay are chosen again, by regression (ARX) refined by
-//! Steiglitz and McBride's iteration, judged by free simulation.
+//! model may be of high order, unstable or poor in simulation, and what it lacks would be called physics. The simulation
+//! is taken as it is even so; but the refit that it is compared with may be of another order, chosen by regression (ARX)
+//! refined by Steiglitz and McBride's iteration, judged by free simulation.
 
 use nalgebra::DMatrix;
 
@@ -14,8 +14,6 @@ use crate::linalg::{eigenvalues, least_squares};
 
 /// Highest order that is tried.
 const MOST_ORDER: usize = 4;
-/// Longest delay that is tried, in samples beyond the first.
-pub(crate) const MOST_DELAY: usize = 4;
 /// Passes of the iteration.
 const PASSES: usize = 6;
 /// A higher order must lower the simulation error by this share: elbow, since misfit of a plant that is not linear
@@ -24,24 +22,19 @@ const WORTH: f64 = 0.08;
 /// Poles are reflected into this circle.
 const INSIDE: f64 = 0.9995;
 
-/// The best baseline of one input (beside the constant) and one output: plant over `[u, 1]`, delay.
-pub(crate) fn rebaseline(data: &Data, most_delay: usize) -> Option<(Plant, usize)> {
-    let mut best: Option<(f64, Plant, usize)> = None;
+/// The best plant of one input over `[u, 1]` and one output.
+pub(crate) fn rebaseline(data: &Data) -> Option<Plant> {
+    let mut best: Option<(f64, Plant)> = None;
     for order in 1..=MOST_ORDER {
-        let mut own: Option<(f64, Plant, usize)> = None;
-        for delay in 0..=most_delay {
-            for (error, plant) in of_order(data, order, delay, true) {
-                if own.as_ref().is_none_or(|o| error < o.0 * 0.98) {
-                    own = Some((error, plant, delay));
-                }
-            }
-        }
+        let own = of_order(data, order, 0, true)
+            .into_iter()
+            .min_by(|a, b| a.0.total_cmp(&b.0));
         let Some(own) = own else { continue };
         if best.as_ref().is_none_or(|b| own.0 < b.0 * (1.0 - WORTH)) {
             best = Some(own);
         }
     }
-    best.map(|(_, plant, delay)| (plant, delay))
+    best.map(|(_, plant)| plant)
 }
 
 /// All passes at one order and delay, with an operating point or about zero: `(relative simulation error, plant)`.

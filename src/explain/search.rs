@@ -1,5 +1,7 @@
 //! From boring explanations to ranked physics.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use super::effects::{self, Definition, Unit};
@@ -249,8 +251,18 @@ pub(crate) fn single_effects(
     }
     // Every lead beside the plant as given, adjusted, and free. A few steps tell which deserve more.
     let frozen = &boring.strict;
+    let one_plant = Arc::ptr_eq(
+        &boring.full.structure.coordinates,
+        &frozen.structure.coordinates,
+    );
     let mut jobs: Vec<(Structure, Vec<f64>)> = Vec::new();
     for (index, lead) in &leads {
+        // What was found around a plant of another order has its numbers.
+        if !one_plant {
+            let basis = if *index == 0 { frozen } else { &boring.full };
+            jobs.push(extended(&basis.structure, &basis.theta, lead));
+            continue;
+        }
         jobs.push(extended(&frozen.structure, &frozen.theta, lead));
         if boring.near.structure.adjusted > 0 {
             jobs.push(extended(&boring.near.structure, &boring.near.theta, lead));
@@ -258,7 +270,7 @@ pub(crate) fn single_effects(
         jobs.push(if *index == 0 {
             let full = &boring.full.structure;
             let mut theta = full.given();
-            if frozen.structure.initial_free && full.states() == frozen.structure.states() {
+            if frozen.structure.initial_free {
                 let from = full.coordinates.len();
                 let states = frozen.structure.states() * frozen.structure.initial.len();
                 theta[from..from + states].copy_from_slice(&frozen.theta[..states]);

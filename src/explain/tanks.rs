@@ -185,15 +185,6 @@ fn found(problem: &Problem) -> Option<CascadeFit> {
     cascade::fit(&records, &problem.mask)
 }
 
-/// Whether tanks simulate `data` with less than this share of the deviation of its output missed.
-pub(crate) fn miss_less(data: &Data, share: f64) -> bool {
-    if data.signals() != 1 || data.outputs != 1 {
-        return false;
-    }
-    let problem = Problem::new(data);
-    found(&problem).is_some_and(|fit| fit.error < share * problem.scale[0])
-}
-
 /// Whether the pump stands still in more of the recording than outliers make up. An input that is negative is a command
 /// relative to an operating point: where half of it does nothing, the law is another one.
 fn idles(data: &Data, found: &CascadeFit) -> bool {
