@@ -226,6 +226,9 @@ pub(crate) fn inquire(
                 fit: fit.clone(),
             });
         }
+        if let Some(one) = in_one_recording(&problem, &fit) {
+            fit = one;
+        }
         let mut gain = base - fit.criterion(count);
         // Where nothing is left, or less than a second effect must bring, there is none to find.
         let left = adequacy(&problem, &fit, &finding.boring.given, None);
@@ -319,6 +322,34 @@ fn output_error_refit(problem: &Problem) -> Option<Structure> {
         initial_free: true,
         ..super::simulation::bare(&plant, &initial)
     })
+}
+
+/// The effect of `fit` in one recording only, where that explains all of them significantly better: the others say that it
+/// is not there.
+fn in_one_recording(problem: &Problem, fit: &Fit) -> Option<Fit> {
+    let recordings = problem.data.segments.len();
+    if recordings < 2 || fit.structure.is_tanks() {
+        return None;
+    }
+    let count = problem.count();
+    // Which one is chosen among them.
+    let owed = 2.0 * (recordings as f64).ln();
+    (0..recordings)
+        .filter_map(|recording| {
+            let structure = Structure {
+                recording: Some(recording),
+                ..fit.structure.clone()
+            };
+            Fit::run(
+                problem,
+                structure,
+                fit.theta.clone(),
+                Some(&fit.noise),
+                Effort::FINAL,
+            )
+        })
+        .min_by(|a, b| a.criterion(count).total_cmp(&b.criterion(count)))
+        .filter(|one| one.criterion(count) + owed < fit.criterion(count))
 }
 
 /// What blocks that were not fitted must show of a gain of which `expected` falls to their share: twice a log

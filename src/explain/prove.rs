@@ -11,7 +11,7 @@ use super::noise::Mask;
 /// Blocks that are set aside, spread over each recording, and the share of it that they make up: enough for the figures of
 /// the proof, and little enough to miss.
 const BLOCKS: usize = 5;
-const SHARE: f64 = 0.15;
+const SHARE: f64 = 0.1;
 /// Blocks of the rest that a candidate is tried on while candidates are compared, between those that are set aside.
 const INNER_BLOCKS: usize = 4;
 const INNER_SHARE: f64 = 0.2;

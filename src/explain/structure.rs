@@ -100,6 +100,8 @@ pub(crate) struct Structure {
     pub feedthrough_free: bool,
     /// Steps of the recursion in a sample interval, more than one where a law decides within it (see `finer`).
     pub substeps: usize,
+    /// The new effects act in this recording only; else in all.
+    pub recording: Option<usize>,
     /// All effects; the first `known.len()` of them are in the simulation already.
     pub effects: Vec<Instance>,
     /// Numbers of the effects that the simulation knows; they are free when the plant is.
@@ -147,6 +149,14 @@ impl Structure {
     /// The effects that are new physics.
     pub fn new_effects(&self) -> &[Instance] {
         &self.effects[self.first_new()..]
+    }
+
+    /// The same without new effects, whose numbers are the last ones.
+    pub fn without_new(&self) -> Self {
+        let mut structure = self.clone();
+        structure.effects.truncate(self.first_new());
+        structure.recording = None;
+        structure
     }
 
     /// Whether the plant is tanks: the linear plant is then only what they do near their mean levels.
@@ -357,6 +367,9 @@ impl Structure {
     /// Simulated outputs of all segments; `None` when they leave any sensible range.
     pub fn simulate(&self, theta: &[f64], data: &Data) -> Option<Series> {
         let prepared = self.prepare(theta);
+        let elsewhere = self.recording.map(|_| self.without_new());
+        let elsewhere =
+            elsewhere.map(|structure| (structure.prepare(&theta[..structure.len()]), structure));
         let mut outputs = Vec::with_capacity(data.segments.len() * data.outputs);
         for (index, segment) in data.segments.iter().enumerate() {
             let clock = Clock {
@@ -365,7 +378,13 @@ impl Structure {
                 fresh: false,
             };
             let x0 = self.initial_state(theta, index);
-            outputs.extend(self.simulate_segment(theta, &prepared, segment, x0, &clock)?);
+            let (structure, prepared, theta) = match &elsewhere {
+                Some((prepared, structure)) if self.recording != Some(index) => {
+                    (structure, prepared, &theta[..structure.len()])
+                }
+                _ => (self, &prepared, theta),
+            };
+            outputs.extend(structure.simulate_segment(theta, prepared, segment, x0, &clock)?);
         }
         Some(outputs)
     }
@@ -415,6 +434,7 @@ impl Structure {
                     parameters: self.shape(theta, index),
                     rate_gain: dot(&signal.rate, &direction),
                     position: signal.position,
+                    position_feedthrough: signal.position_feedthrough,
                     rate: signal.rate,
                     rate_feedthrough: signal.rate_feedthrough,
                     direction,

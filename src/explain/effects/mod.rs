@@ -7,6 +7,7 @@
 mod actuator;
 mod change;
 mod disturbance;
+mod flow;
 mod friction;
 mod lambert;
 mod law;
@@ -255,6 +256,14 @@ impl Definition {
         self.change_time().is_some()
     }
 
+    /// Unit that the output must be measured in, where the law holds for one unit only.
+    pub(crate) fn unit_of_output(&self) -> Option<&'static str> {
+        match self.variant {
+            "deg" | "rad" | "degC" | "K" => Some(self.variant),
+            _ => None,
+        }
+    }
+
     /// Where the effect acts.
     pub fn port(&self) -> Port {
         match self.action {
@@ -273,6 +282,7 @@ pub fn library() -> impl Iterator<Item = &'static Definition> {
     [
         friction::ENTRIES,
         stiffness::ENTRIES,
+        flow::ENTRIES,
         actuator::ENTRIES,
         sensor::ENTRIES,
         disturbance::ENTRIES,
