@@ -219,10 +219,7 @@ impl Answer<'_> {
         } else {
             parameters
         };
-        let structure_share = self
-            .finding
-            .adequacy
-            .map_or(0.0, |a| if a.p_value < 0.01 { a.share } else { 0.0 });
+        let structure_share = self.finding.adequacy.map_or(0.0, |a| a.share_of_error);
         let train_steps = prove::Steps {
             simulation: &given.residual,
             parameters_only: &parameters.residual,
@@ -368,8 +365,9 @@ impl Answer<'_> {
         let share = 100.0 * a.share;
         let sentence = if a.p_value > super::adequacy::LEVEL {
             format!(
-                "What is left is noise to {} flexible features (p = {:.2})",
-                a.features, a.p_value
+                "Nothing is left that {} flexible features find (p = {})",
+                a.features,
+                probability_text(a.p_value)
             )
         } else if a.holds() {
             format!(
@@ -454,6 +452,19 @@ impl Answer<'_> {
             }
         }
         traces
+    }
+}
+
+/// A probability with as many digits as say something.
+fn probability_text(p: f64) -> String {
+    if p >= 0.1 {
+        format!("{p:.2}")
+    } else if p >= 1e-3 {
+        format!("{p:.1e}")
+            .parse::<f64>()
+            .map_or_else(|_| format!("{p:.3}"), |p| format!("{p}"))
+    } else {
+        format!("{p:.0e}")
     }
 }
 

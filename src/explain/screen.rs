@@ -349,7 +349,7 @@ impl<'a> Bench<'a> {
         }));
         if matches!(
             definition.action,
-            Action::Mode | Action::Sine | Action::MissingPath
+            Action::Mode | Action::Sine | Action::MissingPath | Action::Charge
         ) {
             start.extend_from_slice(coefficients);
         }

@@ -212,16 +212,31 @@ const KINDS: &[&[&str]] = &[
         "stribeck_friction",
         "hysteresis",
         "input_backlash",
+        "valve_stiction",
     ],
-    &["cubic_stiffness", "quadratic_stiffness", "end_stop"],
+    &[
+        "cubic_stiffness",
+        "quadratic_stiffness",
+        "end_stop",
+        "law",
+        "gravity_torque",
+        "radiation",
+    ],
     &["input_delay", "actuator_lag", "input_rate_limit"],
     &[
         "sensor_offset",
         "sensor_drift",
         "load_step",
         "periodic_disturbance",
+        "state_of_charge",
     ],
-    &["gain_change", "stiffness_change"],
+    &["gain_change", "stiffness_change", "mass_change"],
+    &[
+        "input_curve",
+        "input_saturation",
+        "input_dead_zone",
+        "input_asymmetry",
+    ],
 ];
 
 pub(crate) fn look_alikes(a: &str, b: &str) -> bool {

@@ -225,7 +225,7 @@ fn rounding(column: &[f64]) -> f64 {
     for v in column.iter().filter(|v| **v != 0.0 && v.is_finite()) {
         let decimals = (-MOST_DECIMALS..=MOST_DECIMALS).find(|d| {
             let scaled = v * 10f64.powi(*d);
-            (scaled - scaled.round()).abs() <= 1e-9 * scaled.abs().max(1e-3)
+            scaled.round() != 0.0 && (scaled - scaled.round()).abs() <= 1e-9 * scaled.abs()
         });
         let decimals = decimals.unwrap_or(MOST_DECIMALS + 1);
         match finest.iter_mut().find(|(of, _)| *of == decade(*v)) {

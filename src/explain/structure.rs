@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use super::coordinates::{Coordinates, Derivatives};
 use super::data::{Data, Segment, Series};
-use super::effects::{Action, Clock, Definition, Needs};
+use super::effects::{Action, CHARGE_ORDERS, Clock, Definition, Needs, charge};
 use super::finer::Finer;
 use super::functionals::{Functionals, dot, matched_sign};
 use super::plant::Plant;
@@ -73,6 +73,7 @@ impl Instance {
     pub fn coefficients(&self, states: usize, outputs: usize) -> usize {
         match self.definition.action {
             Action::Mode | Action::Sine => 2 * outputs,
+            Action::Charge => CHARGE_ORDERS * outputs,
             Action::MissingPath => states,
             _ => 0,
         }
@@ -535,6 +536,18 @@ impl Structure {
             }
         }
         for (index, effect) in self.effects.iter().enumerate() {
+            if matches!(effect.definition.action, Action::Charge) {
+                let coefficients =
+                    &self.effect_numbers(theta, index)[effect.definition.parameters.len()..];
+                let shape = self.shape(theta, index);
+                add_charge(
+                    &shape,
+                    coefficients,
+                    &segment.inputs[effect.channel],
+                    clock,
+                    &mut outputs,
+                );
+            }
             if matches!(effect.definition.action, Action::Sine) && !clock.fresh {
                 let parts =
                     &self.effect_numbers(theta, index)[effect.definition.parameters.len()..];
@@ -593,6 +606,27 @@ pub(crate) fn add_sine(frequency: f64, parts: &[f64], clock: &Clock, outputs: &m
             let (s, c) = (turn * clock.time(k)).sin_cos();
             *y += part[0] * c + part[1] * s;
         }
+    }
+}
+
+/// Adds a curve of the integral of `input` to each output.
+pub(crate) fn add_charge(
+    shape: &[f64],
+    coefficients: &[f64],
+    input: &[f64],
+    clock: &Clock,
+    outputs: &mut Series,
+) {
+    let mut integral = 0.0;
+    for (k, u) in input.iter().enumerate() {
+        let values = charge(shape, integral);
+        for (output, c) in outputs
+            .iter_mut()
+            .zip(coefficients.chunks_exact(CHARGE_ORDERS))
+        {
+            output[k] += values.iter().zip(c).map(|(v, c)| v * c).sum::<f64>();
+        }
+        integral += u * clock.step;
     }
 }
 

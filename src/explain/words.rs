@@ -12,6 +12,7 @@ pub(crate) fn unit_text(unit: Unit, input: &Channel, output: &Channel, integral:
     match unit {
         Unit::Input => per(of(input), ""),
         Unit::InputRate => per(of(input), "/s"),
+        Unit::InputSeconds => per(of(input), " s"),
         Unit::Position if integral => per(of(output), " s"),
         Unit::Position => per(of(output), ""),
         Unit::Rate if integral => per(of(output), ""),

@@ -127,6 +127,29 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: widths,
     },
     Definition {
+        id: "valve_stiction",
+        variant: "",
+        name: "stiction of the actuator, which stays and then jumps,",
+        equation: "u_eff stays until u has moved by stick from where it last followed, then jumps to within stick - slip of u",
+        parameters: &[
+            Parameter::positive("stick", Unit::Input),
+            Parameter::between("slip_share", Unit::Ratio, 0.0, 1.0),
+        ],
+        mimics: &[Mimic {
+            effect: "input_backlash",
+            experiment: "a slow ramp of the command: play follows without steps, stiction in steps",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Input(stiction),
+        starts: |seen| {
+            widths(seen)
+                .into_iter()
+                .flat_map(|w| [0.5, 0.9].map(|share| vec![w[0], share]))
+                .collect()
+        },
+    },
+    Definition {
         id: "input_rate_limit",
         variant: "",
         name: "rate limit of the actuator",
@@ -341,6 +364,20 @@ fn play(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
     }
     for u in u {
         held = f64::clamp(held, *u - p[0], *u + p[0]);
+        *u = held;
+    }
+}
+
+/// Static and kinetic friction of a valve on a command (He, Wang, Pottmann and Qin 2007): what the command has moved adds up
+/// until it exceeds static friction; the valve then moves until kinetic friction holds it.
+fn stiction(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+    let (stick, rest) = (p[0], p[0] * (1.0 - p[1]));
+    let mut held = u.first().copied().unwrap_or(0.0);
+    for u in u {
+        let away = *u - held;
+        if away.abs() > stick {
+            held = *u - away.signum() * rest;
+        }
         *u = held;
     }
 }
