@@ -70,7 +70,8 @@ pub(super) fn find(name: &str, lines: &[&str], roles: &Roles) -> Option<Layout> 
             let cells = || rows.iter().filter_map(|row| row.get(column));
             let present = cells().filter(|cell| !is_missing(cell)).count();
             let numbers = cells().filter(|cell| is_value(cell)).count();
-            numbers > 0 && numbers * 2 > present
+            // Half of them where the one row of a file stands below its header.
+            numbers > 0 && numbers * 2 >= present
         })
         .collect();
     let is_data = |line: &str| {

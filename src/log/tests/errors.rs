@@ -147,7 +147,11 @@ fn roles_that_cannot_be_told() {
             "`--time 1 --inputs 2 --outputs 3`",
         ],
     );
-    fails(read("0,5;1,5;2,5\n"), &["decimal commas"]);
+    // Decimal commas: three columns, not six.
+    fails(
+        read("0,5;1,5;2,5\n"),
+        &["the columns are `1`, `2`, `3` (", "no header"],
+    );
     fails(read("0.5,,nan\n"), &["looks like data"]);
     fails(read_as(csv, &roles("force", "")), &["no outputs"]);
     fails(
