@@ -69,12 +69,12 @@ impl Instance {
     }
 
     /// Numbers after the shape parameters: residues of a mode, cosine and sine parts at the outputs, the column of a
-    /// missing path.
+    /// missing path and the levels it brings, coefficients of a curve of a charge.
     pub fn coefficients(&self, states: usize, outputs: usize) -> usize {
         match self.definition.action {
             Action::Mode | Action::Sine => 2 * outputs,
             Action::Charge => CHARGE_ORDERS * outputs,
-            Action::MissingPath => states,
+            Action::MissingPath => states + outputs,
             _ => 0,
         }
     }
@@ -498,7 +498,8 @@ impl Structure {
         for (index, effect) in self.effects.iter().enumerate() {
             if matches!(effect.definition.action, Action::MissingPath) {
                 let plant = with_paths.to_mut();
-                for (i, b) in self.effect_numbers(theta, index).iter().enumerate() {
+                let column = &self.effect_numbers(theta, index)[..self.states()];
+                for (i, b) in column.iter().enumerate() {
                     plant.b[i * plant.inputs + effect.channel] = *b;
                 }
             }
@@ -536,6 +537,13 @@ impl Structure {
             }
         }
         for (index, effect) in self.effects.iter().enumerate() {
+            if matches!(effect.definition.action, Action::MissingPath) {
+                // The simulation holds for some level of the input that it does not know.
+                let levels = &self.effect_numbers(theta, index)[self.states()..];
+                for (output, level) in outputs.iter_mut().zip(levels) {
+                    output.iter_mut().for_each(|y| *y += level);
+                }
+            }
             if matches!(effect.definition.action, Action::Charge) {
                 let coefficients =
                     &self.effect_numbers(theta, index)[effect.definition.parameters.len()..];

@@ -47,14 +47,7 @@ impl Bench<'_> {
                         direction: Direction::Free,
                     },
                     shape: Vec::new(),
-                    columns: self.directions(
-                        &self
-                            .data()
-                            .segments
-                            .iter()
-                            .map(|s| s.inputs[j].clone())
-                            .collect::<Vec<_>>(),
-                    ),
+                    columns: self.path_columns(j),
                 })
                 .collect(),
             Action::Linear(_) | Action::Exact | Action::Process => Vec::new(),
@@ -191,6 +184,25 @@ impl Bench<'_> {
                 }
             })
             .collect()
+    }
+
+    /// Responses to an input through each state, and a level at each output.
+    fn path_columns(&self, input: usize) -> Vec<Series> {
+        let drive: Vec<Vec<f64>> = self
+            .data()
+            .segments
+            .iter()
+            .map(|s| s.inputs[input].clone())
+            .collect();
+        let mut columns = self.directions(&drive);
+        let l = self.data().outputs;
+        columns.extend((0..l).map(|o| -> Series {
+            let series = self.basis.simulated.iter().enumerate();
+            series
+                .map(|(s, y)| vec![if s % l == o { 1.0 } else { 0.0 }; y.len()])
+                .collect()
+        }));
+        columns
     }
 
     fn charge_templates(&self, definition: &'static Definition, input: usize) -> Vec<Template> {

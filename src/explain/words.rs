@@ -140,6 +140,15 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
             "Something is missing in the simulation that nothing in the library explains adequately.".to_owned(),
         ),
     }
+    if let (Verdict::Unexplained, Some(nearest)) = (e.verdict, e.alternatives.first())
+        && nearest.criterion_gain > needed
+    {
+        lines.push(format!(
+            "The nearest is {}, and it is not named: {}.",
+            nearest.effect.replace('_', " "),
+            nearest.why_not.trim_end_matches('.')
+        ));
+    }
     if !matches!(e.verdict, Verdict::Consistent | Verdict::Parameters) {
         lines.push(match e.location.time.as_slice() {
             [] => format!(

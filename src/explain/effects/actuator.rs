@@ -199,6 +199,44 @@ pub(super) static ENTRIES: &[Definition] = &[
         },
     },
     Definition {
+        id: "input_delay",
+        variant: "from rest",
+        name: "delay of the input",
+        equation: "u_eff(t) = u(t - delay), zero before the recording",
+        parameters: &[Parameter::between("delay", Unit::Second, 0.0, 1e12)],
+        mimics: &[Mimic {
+            effect: "actuator_lag",
+            experiment: A_STEP,
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Input(delay_from_rest),
+        starts: |seen| {
+            [0.3, 1.0, 2.0, 4.0]
+                .map(|samples| vec![samples * seen.step])
+                .to_vec()
+        },
+    },
+    Definition {
+        id: "actuator_lag",
+        variant: "from rest",
+        name: "lag of the actuator or of the sensor, which a linear plant does not tell apart,",
+        equation: "tau du_eff/dt + u_eff = u, zero before the recording",
+        parameters: &[Parameter::positive("time_constant", Unit::Second)],
+        mimics: &[Mimic {
+            effect: "input_delay",
+            experiment: A_STEP,
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Input(lag_from_rest),
+        starts: |seen| {
+            [0.3, 1.0, 3.0, 10.0]
+                .map(|samples| vec![samples * seen.step])
+                .to_vec()
+        },
+    },
+    Definition {
         id: "actuator_lag",
         variant: "",
         name: "lag of the actuator or of the sensor, which a linear plant does not tell apart,",
@@ -404,11 +442,21 @@ fn asymmetry(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
 
 /// Between two samples the held command changes at the share of the interval that is delayed.
 fn delay(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+    let first = u.first().copied().unwrap_or(0.0);
+    delay_after(first, p, u, moment, clock);
+}
+
+fn delay_from_rest(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+    delay_after(0.0, p, u, moment, clock);
+}
+
+/// `start` is what the input was before the recording.
+fn delay_after(start: f64, p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
     let samples = (p[0] / clock.step).clamp(0.0, u.len() as f64);
     let whole = samples.floor() as usize;
     let share = samples - samples.floor();
     let before = u.to_vec();
-    let at = |k: usize, back: usize| before[k.saturating_sub(back)];
+    let at = |k: usize, back: usize| if k < back { start } else { before[k - back] };
     for (k, (u, moment)) in u.iter_mut().zip(moment).enumerate() {
         let (new, old) = (at(k, whole), at(k, whole + 1));
         *u = new + share * (old - new);
@@ -418,6 +466,16 @@ fn delay(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
 
 /// An exponential within each interval.
 fn lag(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+    let first = u.first().copied().unwrap_or(0.0);
+    lag_after(first, p, u, moment, clock);
+}
+
+fn lag_from_rest(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+    lag_after(0.0, p, u, moment, clock);
+}
+
+/// `start` is where the actuator was when the recording began.
+fn lag_after(start: f64, p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
     let a = clock.step / p[0];
     let decay = (-a).exp();
     let mean_of_decay = -(-a).exp_m1() / a;
@@ -427,7 +485,7 @@ fn lag(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
     } else {
         (1.0 - (1.0 + a) * decay) / (a * a) - 0.5 * mean_of_decay
     };
-    let mut at = u.first().copied().unwrap_or(0.0);
+    let mut at = start;
     for (u, moment) in u.iter_mut().zip(moment) {
         let gap = at - *u;
         at = *u + gap * decay;

@@ -12,7 +12,7 @@ pub(super) static ENTRIES: &[Definition] = &[
         mimics: RADIATION_MIMICS,
         linear: &[],
         persists: true,
-        action: Action::Force(radiation_celsius, Needs::Position, Sense::Either),
+        action: Action::Force(radiation_celsius, Needs::Position, Sense::Resists),
         starts: middle,
     },
     Definition {
@@ -24,7 +24,7 @@ pub(super) static ENTRIES: &[Definition] = &[
         mimics: RADIATION_MIMICS,
         linear: &[],
         persists: true,
-        action: Action::Force(radiation_kelvin, Needs::Position, Sense::Either),
+        action: Action::Force(radiation_kelvin, Needs::Position, Sense::Resists),
         starts: middle,
     },
     Definition {
