@@ -26,7 +26,8 @@ Effects (for --without):
   position_dependent_gain input_saturation input_dead_zone input_backlash input_rate_limit input_asymmetry input_delay
   actuator_lag sensor_saturation sensor_offset sensor_drift sensor_rectification sensor_quantization sensor_freeze
   sensor_dropout sensor_outliers sensor_wrap swapped_outputs clock_drift
-  periodic_disturbance load_step extra_mode missing_input gain_change stiffness_change tank_outflow overflow;
+  periodic_disturbance load_step extra_mode missing_input gain_change stiffness_change mass_change tank_outflow
+  overflow input_curve law;
   of drives also cogging direction_dependent_friction
 
 Exit codes: 0 the simulation agrees with the recording; 1 something is missing in it; 2 an error.
@@ -217,10 +218,13 @@ fn simulated(
             ..
         }) if wanted.contains(&column) => {
             let names: Vec<String> = recorded.iter().map(|c| format!("`{c}`")).collect();
-            let first = recorded.first().map_or("y1", |c| c.name.as_str());
+            let missing = wanted.iter().position(|w| *w == column);
+            let missing = missing
+                .and_then(|at| recorded.get(at))
+                .map_or("y1", |c| c.name.as_str());
             anyhow::bail!(
                 "{name}: no simulated output `{column}`: the recording's outputs are {}, and the columns of the simulation \
-                 are {headers}; rename one, or say which is which: `--map 'SIMULATED={first}'`",
+                 are {headers}; rename one, or say which is which: `--map 'SIMULATED={missing}'`",
                 names.join(", ")
             )
         }

@@ -92,14 +92,22 @@ fn simulations_of_another_length() {
     let folder = good();
     let s = signals(SAMPLES - 100);
     folder.text("short.csv", &table("t,y1", DT, &[&s.simulated]));
+    // What both have is compared, and it is said how much that leaves out.
+    let run = folder.run(&[
+        "explain",
+        "recording.csv",
+        "--simulation",
+        "short.csv",
+        "--output",
+        "explanation.json",
+    ]);
     says(
-        &about(&folder, &["recording.csv"], &["short.csv"], &[]),
-        &[
-            "short.csv: 500 samples",
-            "recording.csv has 600",
-            "simulate exactly",
-        ],
+        &run.stderr,
+        &["short.csv: 100 samples of recording.csv are outside"],
     );
+    run.ok();
+    let explanation = json(&folder.join("explanation.json"));
+    assert_eq!(explanation["recordings"][0]["samples"], SAMPLES - 100);
 }
 
 #[test]
@@ -110,10 +118,10 @@ fn simulations_of_another_sampling() {
     says(
         &about(&folder, &["recording.csv"], &["slow.csv"], &[]),
         &[
-            "slow.csv: sample time 0.002 s",
-            "recording.csv",
-            "0.001 s",
+            "slow.csv: the simulation has a sample every 0.002 s",
+            "recording.csv every 0.001 s",
             "simulate at",
+            "--resample 0.002",
         ],
     );
     let slow = StateSpace {
@@ -138,12 +146,20 @@ fn simulations_with_other_channels() {
     );
     says(
         &about(&folder, &["two.csv"], &["simulated.csv"], &[]),
-        &["simulated.csv: 1 simulated output,", "two.csv has 2"],
+        &[
+            "simulated.csv: no simulated output `y2`",
+            "`y1`, `y2`",
+            "`--map 'SIMULATED=y2'`",
+        ],
     );
     folder.text("others.csv", &two.replace("y1,y2", "y3,y4"));
     says(
         &about(&folder, &["recording.csv"], &["others.csv"], &[]),
-        &["others.csv", "2 simulated outputs", "--outputs"],
+        &[
+            "others.csv: no simulated output `y1`",
+            "`y3`, `y4`",
+            "--map",
+        ],
     );
     folder.text("model2.json", &model_json(&systems::two_by_two().system));
     says(
@@ -163,7 +179,12 @@ fn units_that_contradict() {
     folder.text("simulated.csv", &table("t,y1 [mm]", DT, &[&s.simulated]));
     says(
         &about(&folder, &["recording.csv"], &["simulated.csv"], &[]),
-        &["simulated.csv: y1 is in mm", "in m;", "convert"],
+        &[
+            "simulated.csv: the units of y1 contradict each other",
+            "it is in mm",
+            "in m (1 mm is 0.001",
+            "convert",
+        ],
     );
 }
 

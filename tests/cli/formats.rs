@@ -374,13 +374,13 @@ fn a_simulation_is_compared_by_time() {
     let parts = &json(&folder.join("e.json"))["recordings"];
     assert_eq!(parts.as_array().unwrap().len(), 2);
     folder.text("other.csv", &simulation.replace("t,speed", "t,y9"));
-    let message = explain("other.csv", &[]).error();
+    let message = explain("other.csv", &["--quiet"]).error();
     assert!(
         message.contains("`speed [rpm]`") && message.contains("`y9`") && message.contains("--map"),
         "{message}"
     );
     explain("other.csv", &["--map", "y9=speed"]).ok();
     folder.text("later.csv", "t,speed\n0,1\n0.1,2\n0.2,1\n");
-    let message = explain("later.csv", &[]).error();
+    let message = explain("later.csv", &["--quiet"]).error();
     assert!(message.contains("does not overlap"), "{message}");
 }

@@ -206,20 +206,19 @@ fn roles_by_flag_and_units_from_headers() {
     assert_eq!(model["inputs"][0]["unit"], "V");
     assert_eq!(model["outputs"][0]["name"], "speed");
 
-    let without_time = folder
-        .run(&[
-            "identify",
-            "log.csv",
-            "--inputs",
-            "voltage",
-            "--outputs",
-            "speed",
-            "--dt",
-            "0.5",
-            "-o",
-            "-",
-        ])
-        .json();
+    let half_a_second = |flags: &[&str]| {
+        let roles = ["--inputs", "voltage", "--outputs", "speed", "--dt", "0.5"];
+        let mut all = vec!["identify", "log.csv", "-o", "-"];
+        all.extend(roles);
+        all.extend(flags);
+        folder.run(&all)
+    };
+    // The time column says otherwise, unless it is said to be none.
+    let message = half_a_second(&[]).error();
+    for part in ["its step is 0.001 s", "--dt says 0.5 s", "`--time none`"] {
+        assert!(message.contains(part), "{message}");
+    }
+    let without_time = half_a_second(&["--time", "none"]).json();
     assert_eq!(without_time["sample_time"], 0.5);
 }
 
