@@ -285,11 +285,11 @@ impl Answer<'_> {
                     return;
                 };
                 let n = structure.states();
-                let sign = matched_sign(&plant, &rate, input);
-                let value = sign * dot(&balance.row, &numbers[..n]);
+                let sign = matched_sign(&plant, &rows.of(&plant, effect.signal).forward, input);
+                let value = sign * dot(&balance, &numbers[..n]);
                 let std = covariance.filter(|_| !fixed).map(|c| {
                     let block = c.view((offset, offset), (n, n));
-                    let r = nalgebra::DVector::from_column_slice(&balance.row);
+                    let r = nalgebra::DVector::from_column_slice(&balance);
                     ((r.transpose() * block * &r)[(0, 0)].max(0.0)).sqrt()
                 });
                 (

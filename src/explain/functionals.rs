@@ -14,12 +14,16 @@ pub(crate) struct SignalRows {
     pub position_feedthrough: Vec<f64>,
     pub rate: Vec<f64>,
     pub rate_feedthrough: Vec<f64>,
+    /// What tells whether a push through a direction goes forward: the position that it holds, or the speed that it gives.
+    pub forward: Vec<f64>,
 }
 
 /// All rows that a plant's signals can be read with.
 #[derive(Debug, Clone)]
 pub(crate) struct Functionals {
     derivatives: Derivatives,
+    /// Rows of the outputs under a constant push.
+    held: OnceLock<Vec<Vec<f64>>>,
     /// Which outputs [`Functionals::integrates`] is true of: asked for every place of every effect.
     integrating: OnceLock<Vec<bool>>,
 }
@@ -28,6 +32,7 @@ impl Functionals {
     pub fn new(plant: &Plant) -> Self {
         Self {
             derivatives: Derivatives::new(plant),
+            held: OnceLock::new(),
             integrating: OnceLock::new(),
         }
     }
@@ -70,6 +75,15 @@ impl Functionals {
         }
     }
 
+    /// What outputs hold under a constant push: the limit at low frequency, because a plant that integrates has no gain at none.
+    fn held(&self, plant: &Plant) -> &[Vec<f64>] {
+        self.held.get_or_init(|| {
+            (0..plant.outputs)
+                .map(|o| held(plant, plant.c_row(o)).unwrap_or_else(|| plant.c_row(o).to_vec()))
+                .collect()
+        })
+    }
+
     pub fn of(&self, plant: &Plant, signal: Signal) -> SignalRows {
         let d = &self.derivatives;
         let minus =
@@ -80,6 +94,7 @@ impl Functionals {
                 position_feedthrough: plant.d_row(o).to_vec(),
                 rate: d.rate[o].clone(),
                 rate_feedthrough: d.rate_feedthrough[o].clone(),
+                forward: self.held(plant)[o].clone(),
             },
             Signal::Integral(o) => SignalRows {
                 position: d
@@ -89,10 +104,12 @@ impl Functionals {
                 position_feedthrough: Vec::new(),
                 rate: plant.c_row(o).to_vec(),
                 rate_feedthrough: plant.d_row(o).to_vec(),
+                forward: plant.c_row(o).to_vec(),
             },
             Signal::Difference(i, j) => SignalRows {
                 position: minus(plant.c_row(i), plant.c_row(j)),
                 position_feedthrough: minus(plant.d_row(i), plant.d_row(j)),
+                forward: minus(&self.held(plant)[i], &self.held(plant)[j]),
                 rate: minus(&d.rate[i], &d.rate[j]),
                 rate_feedthrough: minus(&d.rate_feedthrough[i], &d.rate_feedthrough[j]),
             },
@@ -113,14 +130,9 @@ fn impulse_size(plant: &Plant, output: usize) -> f64 {
     total.max(1e-300)
 }
 
-/// What a constant push through `direction` does to `row` of the state, over what input `input` does: the input that
-/// balances the push at standstill. The limit at low frequency, because a plant that integrates has no gain at none.
-pub(crate) fn static_equivalent(
-    plant: &Plant,
-    row: &[f64],
-    input: usize,
-) -> Option<StaticEquivalent> {
-    /// How far from one on the real axis the responses are compared: far beyond the slowest pole, and well above rounding.
+/// `row ((1 + e) I - A)^-1`: a row of the state under a push that hardly changes.
+fn held(plant: &Plant, row: &[f64]) -> Option<Vec<f64>> {
+    /// How far from one on the real axis the response is taken: far beyond the slowest pole, and well above rounding.
     const NEAR_STANDSTILL: f64 = 1e-6;
     let n = plant.states;
     let shifted = nalgebra::DMatrix::identity(n, n) * (1.0 + NEAR_STANDSTILL) - plant.a_matrix();
@@ -128,26 +140,27 @@ pub(crate) fn static_equivalent(
         .transpose()
         .lu()
         .solve(&nalgebra::DVector::from_column_slice(row))?;
-    let weights: Vec<f64> = weights.iter().copied().collect();
+    weights
+        .iter()
+        .all(|w| w.is_finite())
+        .then(|| weights.iter().copied().collect())
+}
+
+/// The row that turns the direction of a push into the input `input` that balances it in `row` of the state at standstill.
+pub(crate) fn static_equivalent(plant: &Plant, row: &[f64], input: usize) -> Option<Vec<f64>> {
+    let weights = held(plant, row)?;
     let of_input = dot(&weights, &plant.b_column(input));
     let size: f64 = weights
         .iter()
         .zip(plant.b_column(input))
         .map(|(w, b)| (w * b).abs())
         .sum();
-    (of_input.is_finite() && of_input.abs() > 1e-9 * size).then(|| StaticEquivalent {
-        row: weights.iter().map(|w| w / of_input).collect(),
-    })
+    (of_input.abs() > 1e-9 * size).then(|| weights.iter().map(|w| w / of_input).collect())
 }
 
-/// Row that turns the direction of a push into the input that balances it.
-pub(crate) struct StaticEquivalent {
-    pub row: Vec<f64>,
-}
-
-/// Sign that lets a positive matched amplitude push the rate up.
-pub(crate) fn matched_sign(plant: &Plant, rate: &[f64], input: usize) -> f64 {
-    if dot(rate, &plant.b_column(input)) < 0.0 {
+/// Sign that lets a positive matched amplitude push forward.
+pub(crate) fn matched_sign(plant: &Plant, forward: &[f64], input: usize) -> f64 {
+    if dot(forward, &plant.b_column(input)) < 0.0 {
         -1.0
     } else {
         1.0

@@ -140,7 +140,22 @@ pub(crate) fn inquire(
     if let Some(direct) = with_feedthrough(&problem, &boring.full) {
         boring.full = direct;
     }
-    let base = boring.best(count).criterion(count);
+    let mut base = boring.best(count).criterion(count);
+    // A plant that is known as well as a recording of this length tells costs next to nothing: its numbers are looked for
+    // within their uncertainty, not anywhere.
+    let known_plant =
+        structure.coordinates.len() as f64 * ((count.max(2) as f64).ln() - std::f64::consts::LN_2);
+    let same_plant = |fit: &Fit| {
+        fit.structure.plant_free
+            && known.uncertainty.as_ref().is_some_and(|uncertainty| {
+                uncertainty
+                    .p_value(&problem, fit)
+                    .is_some_and(|p| p > SAME_PLANT)
+            })
+    };
+    if same_plant(&boring.full) {
+        base = base.min(boring.full.criterion(count) - known_plant);
+    }
     let coarse = if allowed(effects::find("sensor_quantization", "")?) {
         coarse_sensor(data, &boring.best(count).residual, &problem.mask)
     } else {
@@ -185,6 +200,9 @@ pub(crate) fn inquire(
         ranked.extend(finer_steps(&problem, &ranked, base, allowed));
     }
     for r in &mut ranked {
+        if same_plant(&r.fit) {
+            r.criterion -= known_plant;
+        }
         r.criterion += penalty(r, base, count);
     }
     ranked.retain(|r| sane(&problem, &r.fit));
@@ -234,7 +252,9 @@ pub(crate) fn inquire(
         if let Some(one) = in_one_recording(&problem, &fit) {
             fit = one;
         }
-        let mut gain = base - fit.criterion(count);
+        let judged =
+            |fit: &Fit| fit.criterion(count) - if same_plant(fit) { known_plant } else { 0.0 };
+        let mut gain = base - judged(&fit);
         // Where nothing is left, or less than a second effect must bring, there is none to find.
         let left = adequacy(&problem, &fit, &finding.boring.given, None);
         let nothing_left = left
@@ -245,7 +265,7 @@ pub(crate) fn inquire(
             pair(&problem, &ranked_all, finding.boring.best(count), allowed)
         };
         if let Some(pair) = second {
-            gain = gain.max(base - pair.criterion(count));
+            gain = gain.max(base - judged(&pair));
             fit = pair;
         }
         finding.gain = gain;

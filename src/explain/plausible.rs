@@ -64,7 +64,7 @@ pub(crate) fn pulls(fit: &Fit, index: usize) -> bool {
     let rows = Functionals::new(&plant);
     let signal = rows.of(&plant, fit.structure.effects[index].signal);
     let direction = fit.structure.direction(&fit.theta, &plant, &rows, index);
-    dot(&signal.rate, &direction) < 0.0
+    dot(&signal.forward, &direction) < 0.0
 }
 
 /// An effect fitted beside the given plant stands only while a free plant does not do significantly better with the
@@ -173,7 +173,7 @@ pub(crate) fn sane(problem: &Problem, fit: &Fit) -> bool {
         if let Action::Force(_, _, sense) = effect.definition.action {
             let signal = rows.of(&plant, effect.signal);
             let direction = fit.structure.direction(&fit.theta, &plant, &rows, index);
-            if sense == Sense::Resists && dot(&signal.rate, &direction) <= 0.0 {
+            if sense == Sense::Resists && dot(&signal.forward, &direction) <= 0.0 {
                 return false;
             }
         }

@@ -299,14 +299,15 @@ impl<'a> Bench<'a> {
             let rows = self.rows.of(&self.plant, instance.signal);
             match instance.direction {
                 Direction::Matched(input) => {
-                    let amplitude = coefficients[0] * matched_sign(&self.plant, &rows.rate, input);
+                    let amplitude =
+                        coefficients[0] * matched_sign(&self.plant, &rows.forward, input);
                     if sense == Sense::Resists && amplitude <= 0.0 {
                         return None;
                     }
                     start.push(amplitude);
                 }
                 Direction::Free => {
-                    if sense == Sense::Resists && dot(&rows.rate, coefficients) <= 0.0 {
+                    if sense == Sense::Resists && dot(&rows.forward, coefficients) <= 0.0 {
                         return None;
                     }
                     start.extend_from_slice(coefficients);

@@ -353,7 +353,7 @@ impl Structure {
             Direction::Matched(input) => {
                 let sign = matched_sign(
                     plant,
-                    &rows.of(plant, self.effects[index].signal).rate,
+                    &rows.of(plant, self.effects[index].signal).forward,
                     input,
                 );
                 plant
