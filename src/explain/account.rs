@@ -76,6 +76,18 @@ impl Answer<'_> {
                 let from = offset + amplitudes + definition.parameters.len();
                 signal = self.sine_amplitudes(model, index, from, covariance, &mut parameters);
             }
+            // What grows with the square of a speed is a drag, whatever state of the plant it is.
+            let of_speed = definition.id == "quadratic_stiffness"
+                && definition.variant == "odd"
+                && super::units::is_speed(output);
+            if of_speed && let Some(drag) = parameters.remove("stiffness") {
+                parameters.insert("drag".to_owned(), drag);
+            }
+            let definition = if of_speed {
+                effects::find("quadratic_drag", "").unwrap_or(definition)
+            } else {
+                definition
+            };
             let mut effect_found = EffectFound {
                 effect: definition.id.to_owned(),
                 variant: definition.variant.to_owned(),
@@ -409,6 +421,9 @@ pub(crate) fn amplitude_name(id: &str) -> &'static str {
         "end_stop" => "stop_stiffness",
         "stiffness_change" => "stiffness_change",
         "mass_change" => "mass_change",
+        "gravity_torque" => "torque_per_angle",
+        "radiation" => "radiation_coefficient",
+        "orifice_flow" => "flow_coefficient",
         "position_dependent_gain" => "gain_per_position",
         _ => "stiffness",
     }

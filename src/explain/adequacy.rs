@@ -17,6 +17,8 @@ use super::structure::Instance;
 
 /// Significance at which what is left counts as structure.
 pub(crate) const LEVEL: f64 = 1e-4;
+/// Significance from which structure that is left is taken off what noise allows.
+const STRUCTURE: f64 = 0.01;
 /// Share of the residual's variance from which structure matters where no physics is named.
 pub(crate) const SHARE: f64 = 0.03;
 
@@ -41,6 +43,8 @@ pub(crate) struct Adequacy {
     pub p_value: f64,
     /// Share of the whitened residual's variance that is explained, less what chance explains.
     pub share: f64,
+    /// Share of the variance of the simulation error itself, not whitened, that is structure: what is above the noise.
+    pub share_of_error: f64,
     /// The same, over what the explanation has removed from the error before it; infinite without one.
     pub of_removed: f64,
     /// The share of it that the named laws may be wrong by.
@@ -142,7 +146,13 @@ pub(crate) fn adequacy(
     } else {
         OF_REMOVED
     };
+    let share_of_error = if p_value(shown) < STRUCTURE {
+        structure_of_error(problem, &fit).unwrap_or(0.0)
+    } else {
+        0.0
+    };
     Some(Adequacy {
+        share_of_error,
         tolerated,
         features,
         p_value: p_value(shown),
@@ -157,6 +167,23 @@ pub(crate) fn adequacy(
             (shown.explained / (there - now).max(1e-12 * left)).min(MOST)
         }),
     })
+}
+
+/// Share of the variance of the simulation error that features explain beyond what coloured noise of as many independent
+/// values would let them.
+fn structure_of_error(problem: &Problem, fit: &Fit) -> Option<f64> {
+    let mut fit = fit.clone();
+    let white = Noise::white(&fit.residual, problem.data.outputs, &problem.mask);
+    let sensitivities = fit.sensitivities(problem);
+    let bench = Bench::new(problem, &fit, &white, sensitivities)?;
+    let (gained, left, features) = bench.feature_gain(&fit)?;
+    let independent = fit
+        .residual
+        .iter()
+        .map(|e| super::weak::effective(e))
+        .sum::<f64>();
+    let chance = features as f64 / independent.max(1.0);
+    Some((gained / left - chance).clamp(0.0, 1.0))
 }
 
 /// Cap of a share of next to nothing.

@@ -147,6 +147,14 @@ impl Answer<'_> {
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };
         explanation.summary = words::summary(&explanation, NEEDED);
+        for &recording in &explanation.location.recordings {
+            let name = &self.recordings[recording].name;
+            let at = explanation.effects.len().min(explanation.summary.len());
+            explanation.summary.insert(
+                at,
+                format!("It acts in {name} only, not in the other recordings."),
+            );
+        }
         if let (Some(mechanics), true) = (
             &explanation.model.mechanics,
             matches!(verdict, Verdict::Parameters | Verdict::Unexplained),
@@ -211,10 +219,7 @@ impl Answer<'_> {
         } else {
             parameters
         };
-        let structure_share = self
-            .finding
-            .adequacy
-            .map_or(0.0, |a| if a.p_value < 0.01 { a.share } else { 0.0 });
+        let structure_share = self.finding.adequacy.map_or(0.0, |a| a.share_of_error);
         let train_steps = prove::Steps {
             simulation: &given.residual,
             parameters_only: &parameters.residual,
@@ -306,11 +311,16 @@ impl Answer<'_> {
                 .iter()
                 .position(|p| p.name == "from")
             {
-                time.push([shape[at], end(0), mean(shown).0]);
+                let last = model.structure.recording.unwrap_or(0);
+                time.push([shape[at], end(last), mean(shown).0]);
             }
         }
         if time.is_empty() {
-            time = locate::windows(data, squares, &self.mask);
+            time = (0..data.segments.len())
+                .filter(|s| model.structure.recording.is_none_or(|only| only == *s))
+                .flat_map(|s| locate::windows(data, squares, &self.mask, s))
+                .collect();
+            time.sort_by(|a, b| b[2].total_cmp(&a[2]));
         }
         let before = locate::spectrum(&boring.residual, l, shown, data.sample_time);
         let after = locate::spectrum(&model.residual, l, shown, data.sample_time);
@@ -324,6 +334,7 @@ impl Answer<'_> {
         });
         let found = self.finding.verdict != Verdict::Consistent;
         Location {
+            recordings: model.structure.recording.into_iter().collect(),
             outputs: if found { outputs } else { Vec::new() },
             port: port.or_else(|| (!self.finding.freezes.is_empty()).then(|| "output".to_owned())),
             time: if found { time } else { Vec::new() },
@@ -354,8 +365,9 @@ impl Answer<'_> {
         let share = 100.0 * a.share;
         let sentence = if a.p_value > super::adequacy::LEVEL {
             format!(
-                "What is left is noise to {} flexible features (p = {:.2})",
-                a.features, a.p_value
+                "Nothing is left that {} flexible features find (p = {})",
+                a.features,
+                probability_text(a.p_value)
             )
         } else if a.holds() {
             format!(
@@ -440,6 +452,19 @@ impl Answer<'_> {
             }
         }
         traces
+    }
+}
+
+/// A probability with as many digits as say something.
+fn probability_text(p: f64) -> String {
+    if p >= 0.1 {
+        format!("{p:.2}")
+    } else if p >= 1e-3 {
+        format!("{p:.1e}")
+            .parse::<f64>()
+            .map_or_else(|_| format!("{p:.3}"), |p| format!("{p}"))
+    } else {
+        format!("{p:.0e}")
     }
 }
 

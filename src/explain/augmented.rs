@@ -311,6 +311,7 @@ impl AugmentedModel {
             known.push(numbers);
         }
         Ok(Structure {
+            recording: None,
             coordinates: Arc::new(Coordinates::fixed(plant, Vec::new())),
             plant_free: false,
             initial_free: false,

@@ -119,7 +119,7 @@ impl Autoregression {
     }
 }
 
-fn of_order(data: &Data, order: usize) -> Option<Simulator> {
+pub(super) fn of_order(data: &Data, order: usize) -> Option<Simulator> {
     let Autoregression {
         regressors,
         targets,

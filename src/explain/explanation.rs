@@ -155,6 +155,9 @@ pub struct Location {
     pub outputs: Vec<String>,
     /// Where in the loop: `input`, `inside`, `output`, `disturbance`.
     pub port: Option<String>,
+    /// Recordings (counted from 0) in which the effect acts, where it does not act in all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub recordings: Vec<usize>,
     /// Windows `[from s, to s, strength]`, strongest first; empty means throughout.
     pub time: Vec<[f64; 3]>,
     /// Bands `[from Hz, to Hz, excess over noise in dB]`.

@@ -51,6 +51,7 @@ pub(crate) fn spring(effects: Vec<Instance>) -> Structure {
         initial: vec![vec![0.0; 2]],
         feedthrough_free: false,
         substeps: 1,
+        recording: None,
         effects,
         known: Vec::new(),
         adjusted: 0,

@@ -10,6 +10,8 @@ use super::structure::Signal;
 #[derive(Debug, Clone)]
 pub(crate) struct SignalRows {
     pub position: Vec<f64>,
+    /// What inputs add to the position directly: the level of an output, where the last input is one.
+    pub position_feedthrough: Vec<f64>,
     pub rate: Vec<f64>,
     pub rate_feedthrough: Vec<f64>,
 }
@@ -75,6 +77,7 @@ impl Functionals {
         match signal {
             Signal::Output(o) => SignalRows {
                 position: plant.c_row(o).to_vec(),
+                position_feedthrough: plant.d_row(o).to_vec(),
                 rate: d.rate[o].clone(),
                 rate_feedthrough: d.rate_feedthrough[o].clone(),
             },
@@ -83,11 +86,13 @@ impl Functionals {
                     .integral
                     .as_ref()
                     .map_or_else(|| vec![0.0; plant.states], |rows| rows[o].clone()),
+                position_feedthrough: Vec::new(),
                 rate: plant.c_row(o).to_vec(),
-                rate_feedthrough: plant.d[o * plant.inputs..(o + 1) * plant.inputs].to_vec(),
+                rate_feedthrough: plant.d_row(o).to_vec(),
             },
             Signal::Difference(i, j) => SignalRows {
                 position: minus(plant.c_row(i), plant.c_row(j)),
+                position_feedthrough: minus(plant.d_row(i), plant.d_row(j)),
                 rate: minus(&d.rate[i], &d.rate[j]),
                 rate_feedthrough: minus(&d.rate_feedthrough[i], &d.rate_feedthrough[j]),
             },

@@ -23,6 +23,10 @@ const TIE: f64 = super::explanation::EFFECTS_TIE;
 const MODE_HANDICAP: f64 = 0.01;
 /// Hysteresis nests dry friction with bristles; it must lead by this share of its gain.
 const DRY_HANDICAP: f64 = 0.01;
+/// A curve without a form must lead the laws that have one by this much, and by this share of its gain (math/physics.md,
+/// fits and decision, 7).
+const CURVE_LEAD: f64 = 12.0;
+const CURVE_HANDICAP: f64 = 0.04;
 /// What an answer owes that physics allows but that is rare, such as a hysteresis that gives energy back: odds of 1
 /// to 400.
 const UNUSUAL: f64 = 12.0;
@@ -186,7 +190,8 @@ pub(crate) fn inquire(
     ranked.retain(|r| sane(&problem, &r.fit));
     add_free_twins(&problem, &finding.boring, &mut ranked, base);
     let mut ranked_all = ranked.clone();
-    ranked.retain(|r| plant_may_stay(r, &ranked_all));
+    let uncertainty = known.uncertainty.as_ref();
+    ranked.retain(|r| plant_may_stay(&problem, r, &ranked_all, uncertainty));
     // Plants of other classes, which no effect added to the linear one becomes.
     ranked.extend(super::tanks::candidates(&problem, structure, allowed));
     ranked.extend(super::rectified::candidates(&problem, structure, allowed));
@@ -208,7 +213,7 @@ pub(crate) fn inquire(
             && (gain > BEYOND_DOUBT
                 || validated_gain(&problem, before, &r.fit)
                     .is_some_and(|held| held.gain > least_heldout(held.share * all)))
-            && reaches(&r.fit, &finding.boring.full)
+            && reaches(&r.fit, &finding.boring.full, known.uncertainty.is_some())
     });
     if let Some(best) = best {
         // A plant of another class has been searched with everything that comes with it, and to the end.
@@ -225,6 +230,9 @@ pub(crate) fn inquire(
                 criterion: fit.criterion(count),
                 fit: fit.clone(),
             });
+        }
+        if let Some(one) = in_one_recording(&problem, &fit) {
+            fit = one;
         }
         let mut gain = base - fit.criterion(count);
         // Where nothing is left, or less than a second effect must bring, there is none to find.
@@ -272,6 +280,16 @@ pub(crate) fn inquire(
             &finding.boring.given,
             None,
         );
+        // What the fewest numbers leave may be little things about the plant, which all of them hold.
+        if finding.adequacy.is_some_and(|a| !a.holds()) {
+            let full = &finding.boring.full;
+            let left = adequacy(&problem, full, &finding.boring.given, None);
+            if left.is_some_and(|a| a.holds()) {
+                finding.adequacy = left;
+                finding.model = full.clone();
+                finding.boring.near = full.clone();
+            }
+        }
         // Rounding is no noise: what it makes up may show as structure.
         let rounded = coarse.map_or(0.0, |(_, _, share)| share);
         let holds = finding
@@ -321,6 +339,34 @@ fn output_error_refit(problem: &Problem) -> Option<Structure> {
     })
 }
 
+/// The effect of `fit` in one recording only, where that explains all of them significantly better: the others say that it
+/// is not there.
+fn in_one_recording(problem: &Problem, fit: &Fit) -> Option<Fit> {
+    let recordings = problem.data.segments.len();
+    if recordings < 2 || fit.structure.is_tanks() {
+        return None;
+    }
+    let count = problem.count();
+    // Which one is chosen among them.
+    let owed = 2.0 * (recordings as f64).ln();
+    (0..recordings)
+        .filter_map(|recording| {
+            let structure = Structure {
+                recording: Some(recording),
+                ..fit.structure.clone()
+            };
+            Fit::run(
+                problem,
+                structure,
+                fit.theta.clone(),
+                Some(&fit.noise),
+                Effort::FINAL,
+            )
+        })
+        .min_by(|a, b| a.criterion(count).total_cmp(&b.criterion(count)))
+        .filter(|one| one.criterion(count) + owed < fit.criterion(count))
+}
+
 /// What blocks that were not fitted must show of a gain of which `expected` falls to their share: twice a log
 /// likelihood ratio has a standard deviation of `2 sqrt(mean)`, and one true effect in twenty may be lost.
 fn least_heldout(expected: f64) -> f64 {
@@ -354,6 +400,9 @@ fn owed(ranked: &Ranked, index: usize, base: f64, count: usize) -> f64 {
         // Hardly to be told from a delay, which every sampled loop has.
         "actuator_lag" => TIE,
         "hysteresis" => DRY_HANDICAP * gain,
+        // A curve without a form follows any law; the law is the simpler answer.
+        "law" | "input_curve" => CURVE_LEAD.max(CURVE_HANDICAP * gain),
+        "valve_stiction" => LAW_IMPERFECTION * gain,
         _ => 0.0,
     };
     owed

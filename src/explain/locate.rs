@@ -36,12 +36,13 @@ fn times(there: f64, elsewhere: f64) -> f64 {
     (there / elsewhere.max(1e-300)).min(MOST_TIMES)
 }
 
-/// Multi-scale windows of segment 0 in which `squares` exceeds noise, `[from s, to s, mean square]`; empty when that is
+/// Multi-scale windows of a segment in which `squares` exceeds noise, `[from s, to s, mean square]`; empty when that is
 /// nowhere or throughout.
-pub(crate) fn windows(data: &Data, squares: &Series, mask: &Mask) -> Vec<[f64; 3]> {
-    let segment = &data.segments[0];
+pub(crate) fn windows(data: &Data, squares: &Series, mask: &Mask, index: usize) -> Vec<[f64; 3]> {
+    let segment = &data.segments[index];
     let n = segment.samples();
     let l = data.outputs;
+    let (squares, mask) = (&squares[index * l..], &mask[index * l..]);
     // Outputs together; a prefix sum makes every window cheap.
     let mut sums = vec![0.0; n + 1];
     let mut counts = vec![0.0; n + 1];
@@ -385,24 +386,24 @@ mod tests {
         let (mut alarms, mut apart) = (0, 0.0);
         for seed in 0..200 {
             let quiet = vec![noise(n, seed)];
-            alarms += usize::from(!windows(&data, &quiet, &mask).is_empty());
+            alarms += usize::from(!windows(&data, &quiet, &mask, 0).is_empty());
             let mut loud = quiet;
             loud[0][1200..1300].iter_mut().for_each(|e| *e += 6.0);
-            let found = windows(&data, &loud, &mask);
+            let found = windows(&data, &loud, &mask, 0);
             assert_eq!(found.len(), 1, "{found:?}");
             let [from, to, strength] = found[0];
             apart += (from - 125.0).abs() + (to - 135.0).abs();
             assert!((strength - 7.0).abs() < 1.0, "{strength}");
             // What does not count shows nothing.
             let hidden: Mask = vec![(0..n).map(|k| !(1150..1350).contains(&k)).collect()];
-            assert!(windows(&data, &loud, &hidden).len() <= 1);
+            assert!(windows(&data, &loud, &hidden, 0).len() <= 1);
         }
         // Ends are found to some samples.
         assert!(apart / 400.0 < 0.6, "{}", apart / 400.0);
         // A level of 1e-3 for the whole map.
         assert!(alarms <= 2, "{alarms} windows of 200 without any");
         let everywhere = vec![noise(n, 7).iter().map(|e| 3.0 * e).collect()];
-        assert!(windows(&data, &everywhere, &mask).is_empty());
+        assert!(windows(&data, &everywhere, &mask, 0).is_empty());
     }
 
     #[test]

@@ -62,12 +62,14 @@ mod run;
 mod screen;
 mod search;
 mod second;
+mod simplest;
 mod simulation;
 mod start;
 mod structure;
 mod tanks;
 mod templates;
 mod uncertainty;
+mod units;
 mod weak;
 mod words;
 

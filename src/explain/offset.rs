@@ -17,11 +17,16 @@ const EXACT: f64 = 1e-7;
 /// `c`, an output each, of the lowest order of autoregression that reproduces the outputs; none where none does, or
 /// where a pole at one takes any constant up.
 pub(crate) fn operating_point(data: &Data) -> Option<Vec<f64>> {
-    (1..=MOST_ORDER).find_map(|order| of_order(data, order))
+    (1..=MOST_ORDER).find_map(|order| of_order(data, order, EXACT))
+}
+
+/// The same of one order of autoregression, as well as it holds.
+pub(crate) fn level_at(data: &Data, order: usize) -> Option<Vec<f64>> {
+    of_order(data, order, f64::INFINITY)
 }
 
 /// Least squares of `y[k] = sum A_i y[k-i] + sum B_i u[k-i] + k0`, all channels scaled, and `(I - sum A_i) c = k0`.
-fn of_order(data: &Data, order: usize) -> Option<Vec<f64>> {
+fn of_order(data: &Data, order: usize, exact: f64) -> Option<Vec<f64>> {
     let (r, l) = (data.inputs, data.outputs);
     let Autoregression {
         regressors,
@@ -31,7 +36,7 @@ fn of_order(data: &Data, order: usize) -> Option<Vec<f64>> {
     } = Autoregression::new(data, order, true)?;
     let found = least_squares(&regressors, &targets).ok()?;
     let missed = (&targets - crate::linalg::multiply(&regressors, &found)).norm();
-    if missed.is_nan() || missed > EXACT * (targets.len() as f64).sqrt() {
+    if missed.is_nan() || missed > exact * (targets.len() as f64).sqrt() {
         return None;
     }
     let mut through = DMatrix::<f64>::identity(l, l);

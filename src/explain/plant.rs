@@ -52,6 +52,11 @@ impl Plant {
         &self.c[output * self.states..(output + 1) * self.states]
     }
 
+    /// Row `output` of `D`.
+    pub fn d_row(&self, output: usize) -> &[f64] {
+        &self.d[output * self.inputs..(output + 1) * self.inputs]
+    }
+
     /// Column `input` of `B`.
     pub fn b_column(&self, input: usize) -> Vec<f64> {
         (0..self.states)

@@ -14,6 +14,7 @@ use super::functionals::{Functionals, dot};
 use super::inquiry::{NEEDED, penalty};
 use super::search::{Boring, Ranked};
 use super::structure::Signal;
+use super::uncertainty::Uncertainty;
 
 /// Probability of a larger difference when the plant is as it was given.
 const SAME_PLANT: f64 = 1e-3;
@@ -68,7 +69,15 @@ pub(crate) fn pulls(fit: &Fit, index: usize) -> bool {
 
 /// An effect fitted beside the given plant stands only while a free plant does not do significantly better with the
 /// same effect: else the effect makes up for wrong parameters (math/explain.md, choice 5).
-pub(crate) fn plant_may_stay(ranked: &Ranked, all: &[Ranked]) -> bool {
+///
+/// A simulation that was identified is uncertain itself: a free plant that differs from it by no more than both are uncertain
+/// by is the same plant.
+pub(crate) fn plant_may_stay(
+    problem: &Problem,
+    ranked: &Ranked,
+    all: &[Ranked],
+    uncertainty: Option<&Uncertainty>,
+) -> bool {
     if ranked.fit.structure.plant_free {
         return true;
     }
@@ -78,6 +87,9 @@ pub(crate) fn plant_may_stay(ranked: &Ranked, all: &[Ranked]) -> bool {
             other.fit.structure.plant_free && other.fit.structure.new_effects()[0].is_same(effect)
         })
         .all(|other| {
+            if let Some(p) = uncertainty.and_then(|known| known.p_value(problem, &other.fit)) {
+                return p > SAME_PLANT;
+            }
             let more = other.fit.free.saturating_sub(ranked.fit.free).max(1);
             let gained = ranked.fit.deviance - other.fit.deviance;
             ChiSquared::new(more as f64).map_or(true, |d| d.sf(gained.max(0.0)) > SAME_PLANT)
@@ -86,12 +98,13 @@ pub(crate) fn plant_may_stay(ranked: &Ranked, all: &[Ranked]) -> bool {
 
 /// Whether an effect beside the plant as given explains as much as other parameters do: it wins by fewer numbers, and
 /// where those explain significantly more it stands for them (math/explain.md, choice 5).
-pub(crate) fn reaches(fit: &Fit, full: &Fit) -> bool {
+/// Errors of a simulation that was identified from about as long a recording count as often as those of the fit.
+pub(crate) fn reaches(fit: &Fit, full: &Fit, identified: bool) -> bool {
     if fit.structure.plant_free {
         return true;
     }
     let more = full.free.saturating_sub(fit.free).max(1);
-    let short = fit.deviance - full.deviance;
+    let short = (fit.deviance - full.deviance) / if identified { 2.0 } else { 1.0 };
     ChiSquared::new(more as f64).map_or(true, |d| d.sf(short.max(0.0)) > SHORT_OF_FULL)
 }
 

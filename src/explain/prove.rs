@@ -10,10 +10,10 @@ use super::noise::Mask;
 
 /// Blocks that are set aside, spread over each recording, and the share of it that they make up: enough for the figures of
 /// the proof, and little enough to miss.
-const BLOCKS: usize = 5;
-const SHARE: f64 = 0.15;
+const BLOCKS: usize = 8;
+const SHARE: f64 = 0.12;
 /// Blocks of the rest that a candidate is tried on while candidates are compared, between those that are set aside.
-const INNER_BLOCKS: usize = 4;
+const INNER_BLOCKS: usize = 7;
 const INNER_SHARE: f64 = 0.2;
 /// Draws of the bootstrap.
 const DRAWS: usize = 500;
@@ -268,10 +268,10 @@ mod tests {
         let held = test[0].iter().filter(|keep| **keep).count();
         assert_eq!(held, (SHARE * N as f64) as usize);
         assert!(train[0].iter().zip(&test[0]).all(|(a, b)| a != b));
-        // One block in each fifth, none at the ends.
-        for fifth in test[0].chunks(N / 5) {
-            assert_eq!(fifth.iter().filter(|keep| **keep).count(), held / 5);
-            assert!(!fifth[0] && !fifth[N / 5 - 1]);
+        // One block in each part, none at the ends.
+        for part in test[0].chunks(N / BLOCKS) {
+            assert_eq!(part.iter().filter(|keep| **keep).count(), held / BLOCKS);
+            assert!(!part[0] && !part[N / BLOCKS - 1]);
         }
         // What candidates are tried on is never of them.
         let (_, tried, share) = inner(&data, &train);

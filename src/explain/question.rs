@@ -46,7 +46,10 @@ pub fn explain(
     }
     memory::check(recordings)?;
     let allowed_id = |id: &str| !options.without.iter().any(|without| without == id);
-    let allowed = |d: &Definition| allowed_id(d.id);
+    // A law of one unit is not tried on what no output is measured in.
+    let outputs = &recordings.first().ok_or(ExplainError::NoRecording)?.outputs;
+    let measured = |unit: &str| outputs.iter().any(|o| super::units::is_in(o, unit));
+    let allowed = |d: &Definition| allowed_id(d.id) && d.unit_of_output().is_none_or(measured);
     // The data before the physics: from here on they are as repaired.
     let checked = Checked::new(recordings, simulation, &allowed_id);
     let recordings = checked.recordings.as_slice();
@@ -54,10 +57,10 @@ pub fn explain(
     let drive = weak::attempt(recordings, &known, &allowed);
     // What a law in the averaged equation of a drive explains to noise needs no other way, and the rest little. Where no law
     // was found, the equation may be blind to what there is (effects of the sensor, another mode), and where a spring
-    // brings the mass back, a free run tells as well.
+    // brings the mass back or a speed is measured, a free run tells as well.
     let settled = drive.as_ref().is_some_and(|(_, finding, _)| {
         finding.augmented.is_some()
-            && !is_brought_back(finding)
+            && finding.weak.as_ref().is_some_and(|proof| proof.drifts())
             && finding
                 .adequacy
                 .is_none_or(|a| a.p_value > LEVEL || a.share < MOSTLY_NOISE)

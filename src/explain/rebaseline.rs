@@ -163,7 +163,7 @@ fn stabilised(a: &[f64]) -> Option<Vec<f64>> {
 }
 
 /// Observer form: `y[k] = sum -a_i y[k-i] + b_i u[k-i] + c`.
-fn companion(a: &[f64], b: &[f64], constant: f64, sample_time: f64) -> Plant {
+pub(super) fn companion(a: &[f64], b: &[f64], constant: f64, sample_time: f64) -> Plant {
     let n = a.len();
     let mut plant = Plant {
         states: n,

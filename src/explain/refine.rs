@@ -118,6 +118,11 @@ fn newest(fit: &Fit) -> Option<&'static Definition> {
     fit.structure.new_effects().last().map(|e| e.definition)
 }
 
+/// Whether an entry is a static curve without a form.
+fn is_curve(definition: &Definition) -> bool {
+    definition.parameters.iter().any(|p| p.held)
+}
+
 /// Richer and other forms of the newest effects that fit well.
 pub(crate) fn derived(
     problem: &Problem,
@@ -127,7 +132,11 @@ pub(crate) fn derived(
     allowed: &(dyn Fn(&Definition) -> bool + Sync),
 ) -> Vec<Ranked> {
     let count = problem.count();
-    let Some(least) = ranked.iter().map(|r| r.criterion).reduce(f64::min) else {
+    // A curve without a form is no rival here: what it follows may be a law in its simplest form.
+    let laws = ranked
+        .iter()
+        .filter(|r| newest(&r.fit).is_some_and(|d| !is_curve(d)));
+    let Some(least) = laws.map(|r| r.criterion).reduce(f64::min) else {
         return Vec::new();
     };
     let reach = least + (IN_THE_RUNNING * (base - least)).max(NEEDED);

@@ -31,6 +31,7 @@ pub(crate) struct ActiveForce {
     pub law: ForceLaw,
     pub parameters: Vec<f64>,
     pub position: Vec<f64>,
+    pub position_feedthrough: Vec<f64>,
     pub rate: Vec<f64>,
     pub rate_feedthrough: Vec<f64>,
     pub direction: Vec<f64>,
@@ -66,7 +67,8 @@ struct SizedForce<'a, const N: usize> {
     direction: [f64; N],
     position_gain: f64,
     memory: [f64; 3],
-    /// What the inputs of the sample add to the rate, and the one that the force is matched with.
+    /// What the inputs of the sample add to the position and to the rate, and the one that the force is matched with.
+    position_input: f64,
     rate_input: f64,
     input: f64,
 }
@@ -122,6 +124,7 @@ fn sized<const N: usize>(
                 .map(|(c, b)| c * b)
                 .sum(),
             memory: [0.0; 3],
+            position_input: 0.0,
             rate_input: 0.0,
             input: 0.0,
         })
@@ -147,13 +150,15 @@ fn sized<const N: usize>(
         }
         for f in &mut forces {
             f.input = inputs.get(f.force.input).map_or(0.0, |u| u[k]);
-            f.rate_input = f
-                .force
-                .rate_feedthrough
-                .iter()
-                .zip(inputs)
-                .map(|(gain, input)| gain * input[k])
-                .sum();
+            let direct = |gains: &[f64]| -> f64 {
+                gains
+                    .iter()
+                    .zip(inputs)
+                    .map(|(gain, input)| gain * input[k])
+                    .sum()
+            };
+            f.position_input = direct(&f.force.position_feedthrough);
+            f.rate_input = direct(&f.force.rate_feedthrough);
         }
         for step in k * grid.steps..(k + 1) * grid.steps {
             let mut next = pushed;
@@ -167,8 +172,8 @@ fn sized<const N: usize>(
             }
             for f in &mut forces {
                 let motion = Motion {
-                    position: dot(&f.position, &x),
-                    position_free: dot(&f.position, &next),
+                    position: dot(&f.position, &x) + f.position_input,
+                    position_free: dot(&f.position, &next) + f.position_input,
                     position_gain: f.position_gain,
                     rate: dot(&f.rate, &x) + f.rate_input,
                     rate_free: dot(&f.rate, &next) + f.rate_input,

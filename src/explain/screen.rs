@@ -349,7 +349,7 @@ impl<'a> Bench<'a> {
         }));
         if matches!(
             definition.action,
-            Action::Mode | Action::Sine | Action::MissingPath
+            Action::Mode | Action::Sine | Action::MissingPath | Action::Charge
         ) {
             start.extend_from_slice(coefficients);
         }
@@ -411,7 +411,9 @@ pub(crate) fn motions(problem: &Problem, fit: &Fit, plant: &Plant) -> Vec<Signal
     for place in &places {
         let rows = rows.of(plant, *place);
         reader.c.extend(&rows.position);
-        reader.d.extend(std::iter::repeat_n(0.0, reader.inputs));
+        let mut direct = rows.position_feedthrough;
+        direct.resize(reader.inputs, 0.0);
+        reader.d.extend(direct);
         reader.c.extend(&rows.rate);
         reader.d.extend(&rows.rate_feedthrough);
     }

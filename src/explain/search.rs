@@ -19,7 +19,7 @@ const PLACES_EACH: usize = 2;
 /// A lead that promises less is not fitted: one step underrates what a fit reaches, but not by this much.
 const HOPELESS: f64 = -10.0;
 /// Scouted fits that are pursued, and forms (places, plant free or not) of one effect among them.
-const PROMISING: usize = 12;
+const PROMISING: usize = 14;
 const FORMS_EACH: usize = 3;
 /// Second effects that are scouted beside each form of a first, and pairs of one first that are pursued.
 const SECONDS_EACH: usize = 4;
@@ -111,9 +111,9 @@ impl Boring {
 
 /// Other parameters about an operating point: where a plant with other gains is linear about a level, its outputs are
 /// shifted as well, and that is no offset of a sensor. Only where the level lies within what the inputs visit: there the
-/// shift is less than the other gains make of twice the standard deviations of the inputs.
+/// shift is less than the other gains make of one standard deviation of the inputs.
 fn about_an_operating_point(problem: &Problem, given: &Structure, full: &Fit) -> Option<Fit> {
-    const WITHIN: f64 = 2.0;
+    const WITHIN: f64 = 1.0;
     let data = problem.data;
     let offset = effects::find("sensor_offset", "")?;
     let mut structure = full.structure.clone();

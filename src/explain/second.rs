@@ -51,11 +51,11 @@ pub(crate) fn pair(
     ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     let best = ranked.first()?;
     let id = |r: &Ranked| r.fit.structure.new_effects()[0].definition.id;
-    // A resonance imitates any linear misfit, so it is no first effect unless it is the best.
-    let other = ranked
-        .iter()
-        .find(|r| id(r) != id(best) && id(r) != "extra_mode");
-    let single_gain = base - best.criterion;
+    // A resonance imitates any linear misfit and a curve any law, so they are no first effects beside others.
+    let imitates = |r: &Ranked| matches!(id(r), "extra_mode" | "law" | "input_curve");
+    let best = ranked.iter().find(|r| !imitates(r)).unwrap_or(best);
+    let other = ranked.iter().find(|r| id(r) != id(best) && !imitates(r));
+    let single_gain = base - ranked[0].criterion;
     // The two best effects, each in its best forms: a free plant may hide the second effect, and the side of a limit
     // may only look right without it. One after
     // the other, since the best pair of one would keep those of the other from being pursued.
@@ -212,16 +212,31 @@ const KINDS: &[&[&str]] = &[
         "stribeck_friction",
         "hysteresis",
         "input_backlash",
+        "valve_stiction",
     ],
-    &["cubic_stiffness", "quadratic_stiffness", "end_stop"],
+    &[
+        "cubic_stiffness",
+        "quadratic_stiffness",
+        "end_stop",
+        "law",
+        "gravity_torque",
+        "radiation",
+    ],
     &["input_delay", "actuator_lag", "input_rate_limit"],
     &[
         "sensor_offset",
         "sensor_drift",
         "load_step",
         "periodic_disturbance",
+        "state_of_charge",
     ],
-    &["gain_change", "stiffness_change"],
+    &["gain_change", "stiffness_change", "mass_change"],
+    &[
+        "input_curve",
+        "input_saturation",
+        "input_dead_zone",
+        "input_asymmetry",
+    ],
 ];
 
 pub(crate) fn look_alikes(a: &str, b: &str) -> bool {

@@ -14,6 +14,7 @@ use super::offset::operating_point;
 use super::plant::Plant;
 use super::run::MOST_STATES;
 use super::search::{Boring, single_effects};
+use super::simplest::{Simplest, simplest};
 use super::structure::Structure;
 use super::uncertainty::Uncertainty;
 use crate::identify::Model;
@@ -353,6 +354,25 @@ fn of_outputs(recordings: &[Log], logs: &[Log], interpolated: bool) -> Result<Kn
         segment.outputs = log.output_data.clone();
     }
     let name = || logs[0].name.clone();
+    if let Some(Simplest {
+        mut plant,
+        initial,
+        level,
+    }) = simplest(&noise_free)
+    {
+        let mut data = data;
+        if let Some(level) = level {
+            add_constant(&mut data, &mut plant, &vec![0.0; delays.len()], &level);
+        }
+        return Ok(Known {
+            structure: bare(&plant, &initial),
+            data,
+            delays,
+            relative: false,
+            identified: false,
+            uncertainty: None,
+        });
+    }
     let simulator = identify_simulator(&noise_free).ok_or_else(|| ExplainError::NotUnderstood {
         name: name(),
         misfit: 1.0,
@@ -441,6 +461,7 @@ fn learn_nonlinear(
         initial_free: false,
         feedthrough_free: false,
         substeps: 1,
+        recording: None,
         initial,
         known: (0..fitted.effects.len())
             .map(|i| fitted.effect_numbers(&best.theta, i).to_vec())
@@ -495,6 +516,7 @@ pub(crate) fn bare(plant: &Plant, initial: &[Vec<f64>]) -> Structure {
         initial,
         feedthrough_free: false,
         substeps: 1,
+        recording: None,
         effects: Vec::new(),
         known: Vec::new(),
         adjusted: 0,

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use super::coordinates::{Coordinates, Derivatives};
 use super::data::{Data, Segment, Series};
-use super::effects::{Action, Clock, Definition, Needs};
+use super::effects::{Action, CHARGE_ORDERS, Clock, Definition, Needs, charge};
 use super::finer::Finer;
 use super::functionals::{Functionals, dot, matched_sign};
 use super::plant::Plant;
@@ -69,11 +69,12 @@ impl Instance {
     }
 
     /// Numbers after the shape parameters: residues of a mode, cosine and sine parts at the outputs, the column of a
-    /// missing path.
+    /// missing path and the levels it brings, coefficients of a curve of a charge.
     pub fn coefficients(&self, states: usize, outputs: usize) -> usize {
         match self.definition.action {
             Action::Mode | Action::Sine => 2 * outputs,
-            Action::MissingPath => states,
+            Action::Charge => CHARGE_ORDERS * outputs,
+            Action::MissingPath => states + outputs,
             _ => 0,
         }
     }
@@ -100,6 +101,8 @@ pub(crate) struct Structure {
     pub feedthrough_free: bool,
     /// Steps of the recursion in a sample interval, more than one where a law decides within it (see `finer`).
     pub substeps: usize,
+    /// The new effects act in this recording only; else in all.
+    pub recording: Option<usize>,
     /// All effects; the first `known.len()` of them are in the simulation already.
     pub effects: Vec<Instance>,
     /// Numbers of the effects that the simulation knows; they are free when the plant is.
@@ -147,6 +150,14 @@ impl Structure {
     /// The effects that are new physics.
     pub fn new_effects(&self) -> &[Instance] {
         &self.effects[self.first_new()..]
+    }
+
+    /// The same without new effects, whose numbers are the last ones.
+    pub fn without_new(&self) -> Self {
+        let mut structure = self.clone();
+        structure.effects.truncate(self.first_new());
+        structure.recording = None;
+        structure
     }
 
     /// Whether the plant is tanks: the linear plant is then only what they do near their mean levels.
@@ -357,6 +368,9 @@ impl Structure {
     /// Simulated outputs of all segments; `None` when they leave any sensible range.
     pub fn simulate(&self, theta: &[f64], data: &Data) -> Option<Series> {
         let prepared = self.prepare(theta);
+        let elsewhere = self.recording.map(|_| self.without_new());
+        let elsewhere =
+            elsewhere.map(|structure| (structure.prepare(&theta[..structure.len()]), structure));
         let mut outputs = Vec::with_capacity(data.segments.len() * data.outputs);
         for (index, segment) in data.segments.iter().enumerate() {
             let clock = Clock {
@@ -365,7 +379,13 @@ impl Structure {
                 fresh: false,
             };
             let x0 = self.initial_state(theta, index);
-            outputs.extend(self.simulate_segment(theta, &prepared, segment, x0, &clock)?);
+            let (structure, prepared, theta) = match &elsewhere {
+                Some((prepared, structure)) if self.recording != Some(index) => {
+                    (structure, prepared, &theta[..structure.len()])
+                }
+                _ => (self, &prepared, theta),
+            };
+            outputs.extend(structure.simulate_segment(theta, prepared, segment, x0, &clock)?);
         }
         Some(outputs)
     }
@@ -415,6 +435,7 @@ impl Structure {
                     parameters: self.shape(theta, index),
                     rate_gain: dot(&signal.rate, &direction),
                     position: signal.position,
+                    position_feedthrough: signal.position_feedthrough,
                     rate: signal.rate,
                     rate_feedthrough: signal.rate_feedthrough,
                     direction,
@@ -477,7 +498,8 @@ impl Structure {
         for (index, effect) in self.effects.iter().enumerate() {
             if matches!(effect.definition.action, Action::MissingPath) {
                 let plant = with_paths.to_mut();
-                for (i, b) in self.effect_numbers(theta, index).iter().enumerate() {
+                let column = &self.effect_numbers(theta, index)[..self.states()];
+                for (i, b) in column.iter().enumerate() {
                     plant.b[i * plant.inputs + effect.channel] = *b;
                 }
             }
@@ -515,6 +537,25 @@ impl Structure {
             }
         }
         for (index, effect) in self.effects.iter().enumerate() {
+            if matches!(effect.definition.action, Action::MissingPath) {
+                // The simulation holds for some level of the input that it does not know.
+                let levels = &self.effect_numbers(theta, index)[self.states()..];
+                for (output, level) in outputs.iter_mut().zip(levels) {
+                    output.iter_mut().for_each(|y| *y += level);
+                }
+            }
+            if matches!(effect.definition.action, Action::Charge) {
+                let coefficients =
+                    &self.effect_numbers(theta, index)[effect.definition.parameters.len()..];
+                let shape = self.shape(theta, index);
+                add_charge(
+                    &shape,
+                    coefficients,
+                    &segment.inputs[effect.channel],
+                    clock,
+                    &mut outputs,
+                );
+            }
             if matches!(effect.definition.action, Action::Sine) && !clock.fresh {
                 let parts =
                     &self.effect_numbers(theta, index)[effect.definition.parameters.len()..];
@@ -573,6 +614,27 @@ pub(crate) fn add_sine(frequency: f64, parts: &[f64], clock: &Clock, outputs: &m
             let (s, c) = (turn * clock.time(k)).sin_cos();
             *y += part[0] * c + part[1] * s;
         }
+    }
+}
+
+/// Adds a curve of the integral of `input` to each output.
+pub(crate) fn add_charge(
+    shape: &[f64],
+    coefficients: &[f64],
+    input: &[f64],
+    clock: &Clock,
+    outputs: &mut Series,
+) {
+    let mut integral = 0.0;
+    for (k, u) in input.iter().enumerate() {
+        let values = charge(shape, integral);
+        for (output, c) in outputs
+            .iter_mut()
+            .zip(coefficients.chunks_exact(CHARGE_ORDERS))
+        {
+            output[k] += values.iter().zip(c).map(|(v, c)| v * c).sum::<f64>();
+        }
+        integral += u * clock.step;
     }
 }
 

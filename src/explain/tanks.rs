@@ -282,6 +282,7 @@ fn structured(
         initial,
         feedthrough_free: false,
         substeps: 1,
+        recording: None,
         effects: definitions
             .into_iter()
             .map(|definition| Instance {

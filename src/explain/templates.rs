@@ -1,11 +1,11 @@
 //! What each law would do along the motion of a fit: columns to regress a residual on.
 
 use super::data::Series;
-use super::effects::{self, Action, Definition, Motion, Needs, Observed};
+use super::effects::{self, Action, CHARGE_ORDERS, Definition, Motion, Needs, Observed};
 use super::plant::Plant;
 use super::run::{Grid, run};
 use super::screen::{Bench, Signals, Template};
-use super::structure::{Direction, Instance, Signal, add_mode, add_sine};
+use super::structure::{Direction, Instance, Signal, add_charge, add_mode, add_sine};
 
 /// Times of change that are tried over a recording.
 const CHANGE_TIMES: usize = 40;
@@ -29,6 +29,9 @@ impl Bench<'_> {
                 .flat_map(|o| self.sensor_templates(definition, o))
                 .collect(),
             Action::Sine => self.sine_templates(definition, lines),
+            Action::Charge => (0..self.data().signals())
+                .flat_map(|j| self.charge_templates(definition, j))
+                .collect(),
             Action::Force(_, needs, _) => self.force_templates(definition, needs, signals),
             Action::Mode => (0..self.data().signals())
                 .filter(|j| self.basis.structure.coordinates.active_inputs.contains(j))
@@ -44,14 +47,7 @@ impl Bench<'_> {
                         direction: Direction::Free,
                     },
                     shape: Vec::new(),
-                    columns: self.directions(
-                        &self
-                            .data()
-                            .segments
-                            .iter()
-                            .map(|s| s.inputs[j].clone())
-                            .collect::<Vec<_>>(),
-                    ),
+                    columns: self.path_columns(j),
                 })
                 .collect(),
             Action::Linear(_) | Action::Exact | Action::Process => Vec::new(),
@@ -184,6 +180,68 @@ impl Bench<'_> {
                         direction: Direction::Free,
                     },
                     columns: (0..2 * l).map(part).collect(),
+                    shape,
+                }
+            })
+            .collect()
+    }
+
+    /// Responses to an input through each state, and a level at each output.
+    fn path_columns(&self, input: usize) -> Vec<Series> {
+        let drive: Vec<Vec<f64>> = self
+            .data()
+            .segments
+            .iter()
+            .map(|s| s.inputs[input].clone())
+            .collect();
+        let mut columns = self.directions(&drive);
+        let l = self.data().outputs;
+        columns.extend((0..l).map(|o| -> Series {
+            let series = self.basis.simulated.iter().enumerate();
+            series
+                .map(|(s, y)| vec![if s % l == o { 1.0 } else { 0.0 }; y.len()])
+                .collect()
+        }));
+        columns
+    }
+
+    fn charge_templates(&self, definition: &'static Definition, input: usize) -> Vec<Template> {
+        let segments = &self.data().segments;
+        let channel = segments
+            .iter()
+            .flat_map(|s| s.inputs[input].clone())
+            .collect();
+        let observed = self.observed(channel, Vec::new(), &[]);
+        let l = self.data().outputs;
+        (definition.starts)(&observed)
+            .into_iter()
+            .map(|shape| {
+                let column = |i: usize| -> Series {
+                    let mut coefficients = vec![0.0; CHARGE_ORDERS * l];
+                    coefficients[i] = 1.0;
+                    let mut series = Vec::new();
+                    for (index, segment) in segments.iter().enumerate() {
+                        let mut y = vec![vec![0.0; segment.samples()]; l];
+                        let clock = self.clock(index);
+                        add_charge(
+                            &shape,
+                            &coefficients,
+                            &segment.inputs[input],
+                            &clock,
+                            &mut y,
+                        );
+                        series.extend(y);
+                    }
+                    series
+                };
+                Template {
+                    instance: Instance {
+                        definition,
+                        channel: input,
+                        signal: Signal::Output(0),
+                        direction: Direction::Free,
+                    },
+                    columns: (0..CHARGE_ORDERS * l).map(column).collect(),
                     shape,
                 }
             })

@@ -12,6 +12,7 @@ pub(crate) fn unit_text(unit: Unit, input: &Channel, output: &Channel, integral:
     match unit {
         Unit::Input => per(of(input), ""),
         Unit::InputRate => per(of(input), "/s"),
+        Unit::InputSeconds => per(of(input), " s"),
         Unit::Position if integral => per(of(output), " s"),
         Unit::Position => per(of(output), ""),
         Unit::Rate if integral => per(of(output), ""),
@@ -138,6 +139,15 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
         Verdict::Unexplained => lines.push(
             "Something is missing in the simulation that nothing in the library explains adequately.".to_owned(),
         ),
+    }
+    if let (Verdict::Unexplained, Some(nearest)) = (e.verdict, e.alternatives.first())
+        && nearest.criterion_gain > needed
+    {
+        lines.push(format!(
+            "The nearest is {}, and it is not named: {}.",
+            nearest.effect.replace('_', " "),
+            nearest.why_not.trim_end_matches('.')
+        ));
     }
     if !matches!(e.verdict, Verdict::Consistent | Verdict::Parameters) {
         lines.push(match e.location.time.as_slice() {

@@ -154,6 +154,7 @@ fn a_line_is_seen_in_its_size() {
 #[test]
 fn another_class_is_asked_over_what_it_removed() {
     let objected = Adequacy {
+        share_of_error: 0.0,
         features: 70,
         p_value: 1e-9,
         share: 0.3,
@@ -167,6 +168,7 @@ fn another_class_is_asked_over_what_it_removed() {
     assert!(!objected.of_class(3.0, 1.0).holds());
     assert!(!objected.of_class(1.0, 2.0).holds());
     let fine = Adequacy {
+        share_of_error: 0.0,
         p_value: 0.5,
         ..objected
     };

@@ -70,7 +70,7 @@ pub(crate) fn same_factor(before: &Plant, after: &Plant, signals: usize) -> Opti
         }
     }
     Some(format!(
-        "All natural frequencies (rates) of the recording are {:.1} % {} than the simulation's, and nothing else differs: a clock (time base, sample time) that is wrong by as much looks the same.",
+        "All natural frequencies (rates) of the recording are {:.1} % {} than the simulation's, and damping and static gains hardly differ: a clock (time base, sample time) that is wrong by as much looks the same.",
         100.0 * change.abs(),
         if change > 0.0 { "higher" } else { "lower" }
     ))

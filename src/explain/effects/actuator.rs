@@ -127,6 +127,29 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: widths,
     },
     Definition {
+        id: "valve_stiction",
+        variant: "",
+        name: "stiction of the actuator, which stays and then jumps,",
+        equation: "u_eff stays until u has moved by stick from where it last followed, then jumps to within stick - slip of u",
+        parameters: &[
+            Parameter::positive("stick", Unit::Input),
+            Parameter::between("slip_share", Unit::Ratio, 0.0, 1.0),
+        ],
+        mimics: &[Mimic {
+            effect: "input_backlash",
+            experiment: "a slow ramp of the command: play follows without steps, stiction in steps",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Input(stiction),
+        starts: |seen| {
+            widths(seen)
+                .into_iter()
+                .flat_map(|w| [0.5, 0.9].map(|share| vec![w[0], share]))
+                .collect()
+        },
+    },
+    Definition {
         id: "input_rate_limit",
         variant: "",
         name: "rate limit of the actuator",
@@ -171,6 +194,44 @@ pub(super) static ENTRIES: &[Definition] = &[
         action: Action::Input(delay),
         starts: |seen| {
             [0.3, 1.0, 2.0, 4.0]
+                .map(|samples| vec![samples * seen.step])
+                .to_vec()
+        },
+    },
+    Definition {
+        id: "input_delay",
+        variant: "from rest",
+        name: "delay of the input",
+        equation: "u_eff(t) = u(t - delay), zero before the recording",
+        parameters: &[Parameter::between("delay", Unit::Second, 0.0, 1e12)],
+        mimics: &[Mimic {
+            effect: "actuator_lag",
+            experiment: A_STEP,
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Input(delay_from_rest),
+        starts: |seen| {
+            [0.3, 1.0, 2.0, 4.0]
+                .map(|samples| vec![samples * seen.step])
+                .to_vec()
+        },
+    },
+    Definition {
+        id: "actuator_lag",
+        variant: "from rest",
+        name: "lag of the actuator or of the sensor, which a linear plant does not tell apart,",
+        equation: "tau du_eff/dt + u_eff = u, zero before the recording",
+        parameters: &[Parameter::positive("time_constant", Unit::Second)],
+        mimics: &[Mimic {
+            effect: "input_delay",
+            experiment: A_STEP,
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Input(lag_from_rest),
+        starts: |seen| {
+            [0.3, 1.0, 3.0, 10.0]
                 .map(|samples| vec![samples * seen.step])
                 .to_vec()
         },
@@ -345,6 +406,20 @@ fn play(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
     }
 }
 
+/// Static and kinetic friction of a valve on a command (He, Wang, Pottmann and Qin 2007): what the command has moved adds up
+/// until it exceeds static friction; the valve then moves until kinetic friction holds it.
+fn stiction(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+    let (stick, rest) = (p[0], p[0] * (1.0 - p[1]));
+    let mut held = u.first().copied().unwrap_or(0.0);
+    for u in u {
+        let away = *u - held;
+        if away.abs() > stick {
+            held = *u - away.signum() * rest;
+        }
+        *u = held;
+    }
+}
+
 /// A ramp over the share `ramp` of the interval, then constant.
 fn rate_limit(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
     let most = p[0] * clock.step;
@@ -367,11 +442,21 @@ fn asymmetry(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
 
 /// Between two samples the held command changes at the share of the interval that is delayed.
 fn delay(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+    let first = u.first().copied().unwrap_or(0.0);
+    delay_after(first, p, u, moment, clock);
+}
+
+fn delay_from_rest(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+    delay_after(0.0, p, u, moment, clock);
+}
+
+/// `start` is what the input was before the recording.
+fn delay_after(start: f64, p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
     let samples = (p[0] / clock.step).clamp(0.0, u.len() as f64);
     let whole = samples.floor() as usize;
     let share = samples - samples.floor();
     let before = u.to_vec();
-    let at = |k: usize, back: usize| before[k.saturating_sub(back)];
+    let at = |k: usize, back: usize| if k < back { start } else { before[k - back] };
     for (k, (u, moment)) in u.iter_mut().zip(moment).enumerate() {
         let (new, old) = (at(k, whole), at(k, whole + 1));
         *u = new + share * (old - new);
@@ -381,6 +466,16 @@ fn delay(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
 
 /// An exponential within each interval.
 fn lag(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+    let first = u.first().copied().unwrap_or(0.0);
+    lag_after(first, p, u, moment, clock);
+}
+
+fn lag_from_rest(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+    lag_after(0.0, p, u, moment, clock);
+}
+
+/// `start` is where the actuator was when the recording began.
+fn lag_after(start: f64, p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
     let a = clock.step / p[0];
     let decay = (-a).exp();
     let mean_of_decay = -(-a).exp_m1() / a;
@@ -390,7 +485,7 @@ fn lag(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
     } else {
         (1.0 - (1.0 + a) * decay) / (a * a) - 0.5 * mean_of_decay
     };
-    let mut at = u.first().copied().unwrap_or(0.0);
+    let mut at = start;
     for (u, moment) in u.iter_mut().zip(moment) {
         let gap = at - *u;
         at = *u + gap * decay;

@@ -1,6 +1,6 @@
 //! What acts on the plant and was not commanded, and paths that the simulation lacks.
 
-use super::{Action, Definition, Mimic, Motion, Needs, Parameter, Sense, Unit};
+use super::{Action, Definition, Mimic, Motion, Needs, Observed, Parameter, Sense, Unit};
 
 pub(super) static ENTRIES: &[Definition] = &[
     Definition {
@@ -64,6 +64,24 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: |seen| seen.frequencies.iter().map(|f| vec![*f, 0.05]).collect(),
     },
     Definition {
+        id: "state_of_charge",
+        variant: "",
+        name: "dependence of the output on the integral of the input (state of charge)",
+        equation: "y = y_true + c1 s + c2 P2(s) + c3 P3(s) + c4 P4(s), s = (int u dt - centre)/half_range, P Legendre polynomials",
+        parameters: &[
+            Parameter::real("centre", Unit::InputSeconds).held(),
+            Parameter::positive("half_range", Unit::InputSeconds).held(),
+        ],
+        mimics: &[Mimic {
+            effect: "sensor_drift",
+            experiment: "let the input rest in the middle of the recording: a drift goes on, a charge stays",
+        }],
+        linear: &[],
+        persists: true,
+        action: Action::Charge,
+        starts: charges,
+    },
+    Definition {
         id: "missing_input",
         variant: "",
         name: "input that acts in reality and not in the simulation",
@@ -76,6 +94,21 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: |_| vec![vec![]],
     },
 ];
+
+/// The range of the integral over the recording.
+fn charges(seen: &Observed) -> Vec<Vec<f64>> {
+    let (mut at, mut low, mut high) = (0.0, 0.0_f64, 0.0_f64);
+    for u in &seen.channel {
+        at += u * seen.step;
+        low = low.min(at);
+        high = high.max(at);
+    }
+    if high > low {
+        vec![vec![0.5 * (low + high), 0.5 * (high - low)]]
+    } else {
+        Vec::new()
+    }
+}
 
 fn step(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     motion.clock.share_after(motion.sample, p[0])

@@ -123,6 +123,19 @@ pub(super) fn curve(p: &[f64], v: f64) -> f64 {
     value + rise * (s - inside)
 }
 
+/// Coefficients of a curve of the integral of an input, an output: polynomials of order one to four.
+pub(crate) const CHARGE_ORDERS: usize = 4;
+
+/// Legendre's polynomials of order one to four in `s = (v - centre)/half_range`; straight lines beyond the range.
+pub(crate) fn charge(shape: &[f64], v: f64) -> [f64; CHARGE_ORDERS] {
+    let of = |order: usize| {
+        let mut p = [shape[0], shape[1], 0.0, 0.0, 0.0, 0.0];
+        p[order] = 1.0;
+        curve(&p, v)
+    };
+    [(v - shape[0]) / shape[1], of(2), of(3), of(4)]
+}
+
 /// Curves to start from, over the range of `values`, of `size` times it: bent one way, and bent both ways.
 pub(super) fn curves(values: &[f64], size: f64) -> Vec<Vec<f64>> {
     let (low, high) = (level(values, 0.002, |v| v), level(values, 0.998, |v| v));

@@ -7,6 +7,7 @@
 mod actuator;
 mod change;
 mod disturbance;
+mod flow;
 mod friction;
 mod lambert;
 mod law;
@@ -17,7 +18,7 @@ mod stiffness;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use law::{Clock, Motion, Observed, decay, level};
+pub(crate) use law::{CHARGE_ORDERS, Clock, Motion, Observed, charge, decay, level};
 
 /// Where an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,6 +44,8 @@ pub enum Unit {
     Input,
     /// The unit of the input channel per second.
     InputRate,
+    /// The unit of the input channel times seconds.
+    InputSeconds,
     /// The unit of the output (or position) that the effect looks at.
     Position,
     /// That unit per second.
@@ -169,6 +172,8 @@ pub(crate) enum Action {
     Sine,
     /// The path of an input that the simulation lacks (`missing_input`).
     MissingPath,
+    /// A curve of the integral of an input, added to the outputs.
+    Charge,
     /// Part of a plant of another class, which is run in place of the linear one (`tanks`).
     Process,
     /// Found by an exact test; in the model it is a sensor law without effect on fits.
@@ -192,6 +197,7 @@ impl std::fmt::Debug for Action {
             Self::Mode => "Mode",
             Self::Sine => "Sine",
             Self::MissingPath => "MissingPath",
+            Self::Charge => "Charge",
             Self::Process => "Process",
             Self::Exact => "Exact",
         })
@@ -255,13 +261,21 @@ impl Definition {
         self.change_time().is_some()
     }
 
+    /// Unit that the output must be measured in, where the law holds for one unit only.
+    pub(crate) fn unit_of_output(&self) -> Option<&'static str> {
+        match self.variant {
+            "deg" | "rad" | "degC" | "K" => Some(self.variant),
+            _ => None,
+        }
+    }
+
     /// Where the effect acts.
     pub fn port(&self) -> Port {
         match self.action {
             Action::Input(_) => Port::Input,
             Action::Force(..) | Action::Linear(_) => Port::Force,
             Action::Sensor(_) | Action::Sine => Port::Sensor,
-            Action::Mode | Action::MissingPath => Port::Path,
+            Action::Mode | Action::MissingPath | Action::Charge => Port::Path,
             Action::Process => Port::Process,
             Action::Exact => Port::Exact,
         }
@@ -273,6 +287,7 @@ pub fn library() -> impl Iterator<Item = &'static Definition> {
     [
         friction::ENTRIES,
         stiffness::ENTRIES,
+        flow::ENTRIES,
         actuator::ENTRIES,
         sensor::ENTRIES,
         disturbance::ENTRIES,

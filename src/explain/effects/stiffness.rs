@@ -188,8 +188,32 @@ pub(super) static ENTRIES: &[Definition] = &[
         linear: &[],
         persists: true,
         action: Action::Force(cogging, Needs::Position, Sense::Either),
-        // Many periods in a travel: only the averaged equation of motion finds the pitch.
-        starts: |_| Vec::new(),
+        // Many periods in a travel: of other pitches than parts of a turn only the averaged equation of motion finds one.
+        starts: parts_of_a_turn,
+    },
+    Definition {
+        id: "gravity_torque",
+        variant: "deg",
+        name: "torque of gravity, which grows with the sine of the angle,",
+        equation: "F = -k (sin(x) - x), x in degrees",
+        parameters: &[],
+        mimics: SINE_MIMICS,
+        linear: &[],
+        persists: true,
+        action: Action::Force(gravity_degrees, Needs::Position, Sense::Either),
+        starts: |seen| turns(seen, 360.0),
+    },
+    Definition {
+        id: "gravity_torque",
+        variant: "rad",
+        name: "torque of gravity, which grows with the sine of the angle,",
+        equation: "F = -k (sin(x) - x), x in radians",
+        parameters: &[],
+        mimics: SINE_MIMICS,
+        linear: &[],
+        persists: true,
+        action: Action::Force(gravity_radians, Needs::Position, Sense::Either),
+        starts: |seen| turns(seen, std::f64::consts::TAU),
     },
     Definition {
         id: "law",
@@ -236,6 +260,52 @@ const STOP_MIMICS: &[Mimic] = &[
         experiment: "a slow ramp over the whole travel: a stop has a corner, a cubic spring has none",
     },
 ];
+
+const SINE_MIMICS: &[Mimic] = &[Mimic {
+    effect: "cubic_stiffness",
+    experiment: "angles beyond a right angle: gravity turns back there, a spring does not",
+}];
+
+/// What gravity takes off a linear torque: a simulation that is linear about the lower position has the rest.
+fn gravity(angle: f64) -> f64 {
+    angle - angle.sin()
+}
+
+fn gravity_degrees(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    gravity(motion.middle().to_radians()).to_degrees()
+}
+
+fn gravity_radians(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    gravity(motion.middle())
+}
+
+/// One start without a shape where the position moves as an angle does: over a tenth of a turn and not over many turns.
+fn turns(seen: &Observed, turn: f64) -> Vec<Vec<f64>> {
+    let most = level(&seen.channel, 0.998, f64::abs);
+    if (0.1 * turn..2.0 * turn).contains(&(2.0 * most)) {
+        vec![vec![]]
+    } else {
+        Vec::new()
+    }
+}
+
+/// Pitches as parts of a turn, in degrees and in radians, as far as the position covers some and not too many of them, in two
+/// phases each.
+fn parts_of_a_turn(seen: &Observed) -> Vec<Vec<f64>> {
+    const PARTS: [f64; 14] = [
+        1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 9.0, 10.0, 12.0, 15.0, 18.0, 24.0, 36.0, 48.0,
+    ];
+    let (low, high) = (
+        level(&seen.channel, 0.002, |v| v),
+        level(&seen.channel, 0.998, |v| v),
+    );
+    [360.0, std::f64::consts::TAU]
+        .iter()
+        .flat_map(|turn| PARTS.map(|parts| turn / parts))
+        .filter(|pitch| (1.0..200.0).contains(&((high - low) / pitch)))
+        .flat_map(|pitch| [0.0, std::f64::consts::FRAC_PI_2].map(|phase| vec![pitch, phase]))
+        .collect()
+}
 
 fn curve(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     super::law::curve(p, motion.middle())

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use realfft::RealFftPlanner;
 
-use super::colour::{Colour, MOST_MIXED, MOST_ORDER, reflections};
+use super::colour::{Colour, MOST_MIXED, MOST_ORDER};
 use super::{Mask, product};
 use crate::explain::data::Series;
 
@@ -37,6 +37,9 @@ const STEPS: usize = 30;
 const SETTLED: f64 = 1e-3;
 /// Poles and zeros further out than this many samples' memory are not distinguished from the circle.
 const LONGEST_MEMORY: f64 = 1e5;
+/// An oscillation that stays in phase for more than one part in this of a recording is a disturbance with a frequency, and no
+/// noise.
+const COHERENCE: f64 = 20.0;
 /// Values that each coefficient needs.
 const VALUES_A_COEFFICIENT: usize = 12;
 
@@ -117,6 +120,7 @@ pub(super) fn colour(
         return best.1;
     };
     let starts = Starts::new(&filled, &covariance, &long);
+    let coherent = (-COHERENCE / filled.iter().map(Vec::len).max().unwrap_or(1) as f64).exp();
     let mut lower: Option<(Vec<f64>, Vec<f64>)> = None;
     for &(p, q) in colours.mixed() {
         let mut tried: Vec<(Vec<f64>, Vec<f64>)> = starts.mixed(p, q).into_iter().collect();
@@ -142,8 +146,8 @@ pub(super) fn colour(
         let Some((ar, ma)) = bins.fitted(ar, ma) else {
             continue;
         };
-        let Some(colour) = inside(&ar)
-            .zip(inside(&ma))
+        let Some(colour) = inside(&ar, coherent)
+            .zip(inside(&ma, 1.0))
             .and_then(|(ar, ma)| Colour::new(ar, ma))
         else {
             continue;
@@ -264,11 +268,9 @@ fn multiplied(polynomial: &[f64], root: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The polynomial of the same magnitude on the circle whose roots are inside of it.
-fn inside(polynomial: &[f64]) -> Option<Vec<f64>> {
-    if reflections(polynomial).is_some() {
-        return Some(polynomial.to_vec());
-    }
+/// The polynomial of the same magnitude on the circle whose roots are inside of it, complex ones no nearer to it than
+/// `coherent`.
+fn inside(polynomial: &[f64], coherent: f64) -> Option<Vec<f64>> {
     let n = polynomial.len();
     let companion = DMatrix::from_fn(n, n, |i, j| {
         if i == 0 {
@@ -285,6 +287,11 @@ fn inside(polynomial: &[f64]) -> Option<Vec<f64>> {
         if root.norm() > 1.0 {
             root = root.conj().inv();
         }
+        let most = if root.im == 0.0 {
+            most
+        } else {
+            most.min(coherent)
+        };
         if root.norm() > most {
             root *= most / root.norm();
         }
@@ -368,7 +375,7 @@ impl Starts {
         let solved = gram.cholesky()?.solve(&right);
         let ar: Vec<f64> = solved.iter().take(p).map(|v| -v).collect();
         let ma: Vec<f64> = solved.iter().skip(p).copied().collect();
-        inside(&ar).zip(inside(&ma))
+        inside(&ar, 1.0).zip(inside(&ma, 1.0))
     }
 }
 

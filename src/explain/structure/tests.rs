@@ -38,6 +38,7 @@ fn structure(effects: Vec<Instance>) -> Structure {
         initial: vec![vec![0.1, 0.2, 0.3], vec![-0.4, 0.5, 0.6]],
         feedthrough_free: true,
         substeps: 1,
+        recording: None,
         effects,
         known: Vec::new(),
         adjusted: 0,

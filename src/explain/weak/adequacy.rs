@@ -71,6 +71,8 @@ pub(crate) fn adequacy(
     let p_value = ChiSquared::new(count as f64).map_or(1.0, |d| d.sf(statistic));
     let share = (gained - chance).max(0.0);
     (n > 2 * features).then(|| Adequacy {
+        // The force is tested, not the motion.
+        share_of_error: 0.0,
         tolerated: IMPERFECTION,
         features,
         // The best of several families was taken (Bonferroni).

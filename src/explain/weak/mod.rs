@@ -35,3 +35,4 @@ mod tether;
 mod windows;
 
 pub(crate) use inquiry::{Proof, attempt};
+pub(crate) use regression::effective;

@@ -262,6 +262,7 @@ impl Equation {
                 initial: starts.iter().map(|s| s[..n].to_vec()).collect(),
                 feedthrough_free: false,
                 substeps: 1,
+                recording: None,
                 effects,
                 known: Vec::new(),
                 adjusted: 0,

@@ -1,0 +1,69 @@
+//! Units as loggers write them: which law may hold for a channel.
+
+use crate::log::Channel;
+
+/// Ways in which a unit is written, in lower case; the first stands for it.
+const WRITTEN: &[&[&str]] = &[
+    &["deg", "\u{b0}", "degree", "degrees"],
+    &["rad", "radian", "radians"],
+    &["degC", "degc", "\u{b0}c", "c", "celsius", "grad c"],
+    &["K", "k", "kelvin"],
+];
+
+/// Units of a speed.
+const SPEEDS: &[&str] = &[
+    "m/s", "km/h", "kmh", "kph", "mph", "kn", "knots", "mm/s", "cm/s", "rpm", "1/min", "min-1",
+    "u/min", "rad/s", "rads", "deg/s", "\u{b0}/s", "mps", "rps", "hz",
+];
+
+/// The unit of a channel in lower case: of its brackets, else what the name ends with behind an underscore.
+fn written(channel: &Channel) -> Option<String> {
+    let unit = channel.unit.clone();
+    unit.or_else(|| {
+        channel
+            .name
+            .rsplit_once('_')
+            .map(|(_, last)| last.to_owned())
+    })
+    .map(|unit| unit.trim().to_lowercase())
+}
+
+/// Whether `channel` is measured in `unit`.
+pub(crate) fn is_in(channel: &Channel, unit: &str) -> bool {
+    written(channel).is_some_and(|written| {
+        WRITTEN.iter().any(|list| {
+            list[0] == unit
+                && (list[0].to_lowercase() == written || list.contains(&written.as_str()))
+        })
+    })
+}
+
+/// Whether `channel` is a speed.
+pub(crate) fn is_speed(channel: &Channel) -> bool {
+    written(channel).is_some_and(|written| SPEEDS.contains(&written.as_str()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channel(name: &str, unit: Option<&str>) -> Channel {
+        Channel {
+            name: name.to_owned(),
+            unit: unit.map(str::to_owned),
+        }
+    }
+
+    #[test]
+    fn units_are_known_from_brackets_and_names() {
+        assert!(is_in(&channel("T_furnace_degC", None), "degC"));
+        assert!(is_in(&channel("T", Some("\u{b0}C")), "degC"));
+        assert!(is_in(&channel("T_reactor", Some("K")), "K"));
+        assert!(is_in(&channel("angle", Some("deg")), "deg"));
+        assert!(!is_in(&channel("angle", Some("deg")), "degC"));
+        assert!(!is_in(&channel("level", None), "K"));
+        assert!(is_speed(&channel("v_kmh", None)));
+        assert!(is_speed(&channel("speed", Some("RPM"))));
+        assert!(!is_speed(&channel("disp_mm", None)));
+    }
+}
