@@ -27,7 +27,7 @@ Effects (for --without):
   actuator_lag sensor_saturation sensor_offset sensor_drift sensor_rectification sensor_quantization sensor_freeze
   sensor_dropout sensor_outliers sensor_wrap swapped_outputs clock_drift
   periodic_disturbance load_step extra_mode missing_input gain_change stiffness_change mass_change tank_outflow
-  overflow input_curve law;
+  orifice_flow overflow radiation state_of_charge gravity_torque valve_stiction input_curve law;
   of drives also cogging direction_dependent_friction
 
 Exit codes: 0 the simulation agrees with the recording; 1 something is missing in it; 2 an error.

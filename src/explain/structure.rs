@@ -4,15 +4,17 @@
 //! every segment, the levels of the outputs, and the numbers of each effect. Logarithmic parameters are held as
 //! logarithms.
 
+mod added;
 #[cfg(test)]
 mod tests;
 
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use super::coordinates::{Coordinates, Derivatives};
+pub(crate) use self::added::{add_charge, add_mode, add_sine, with_moments};
+use super::coordinates::Coordinates;
 use super::data::{Data, Segment, Series};
-use super::effects::{Action, CHARGE_ORDERS, Clock, Definition, Needs, charge};
+use super::effects::{Action, CHARGE_ORDERS, Clock, Definition, Needs};
 use super::finer::Finer;
 use super::functionals::{Functionals, dot, matched_sign};
 use super::plant::Plant;
@@ -581,82 +583,4 @@ pub(crate) struct Prepared {
     pub plant: Plant,
     pub forces: Vec<ActiveForce>,
     finer: Option<Finer>,
-}
-
-/// The plant with the first moments of its inputs as further inputs.
-pub(crate) fn with_moments(plant: &Plant) -> Plant {
-    let moment = Derivatives::new(plant).moment;
-    let (n, r, l) = (plant.states, plant.inputs, plant.outputs);
-    let mut wider = plant.clone();
-    wider.inputs = 2 * r;
-    wider.b = (0..n)
-        .flat_map(|i| (0..2 * r).map(move |j| (i, j)))
-        .map(|(i, j)| {
-            if j < r {
-                plant.b[i * r + j]
-            } else {
-                moment[j - r][i]
-            }
-        })
-        .collect();
-    wider.d = (0..l)
-        .flat_map(|o| (0..2 * r).map(move |j| (o, j)))
-        .map(|(o, j)| if j < r { plant.d[o * r + j] } else { 0.0 })
-        .collect();
-    wider
-}
-
-/// Adds `c cos(2 pi f t) + s sin(2 pi f t)` to each output, `parts` being `c, s` of each.
-pub(crate) fn add_sine(frequency: f64, parts: &[f64], clock: &Clock, outputs: &mut Series) {
-    let turn = std::f64::consts::TAU * frequency;
-    for (output, part) in outputs.iter_mut().zip(parts.chunks_exact(2)) {
-        for (k, y) in output.iter_mut().enumerate() {
-            let (s, c) = (turn * clock.time(k)).sin_cos();
-            *y += part[0] * c + part[1] * s;
-        }
-    }
-}
-
-/// Adds a curve of the integral of `input` to each output.
-pub(crate) fn add_charge(
-    shape: &[f64],
-    coefficients: &[f64],
-    input: &[f64],
-    clock: &Clock,
-    outputs: &mut Series,
-) {
-    let mut integral = 0.0;
-    for (k, u) in input.iter().enumerate() {
-        let values = charge(shape, integral);
-        for (output, c) in outputs
-            .iter_mut()
-            .zip(coefficients.chunks_exact(CHARGE_ORDERS))
-        {
-            output[k] += values.iter().zip(c).map(|(v, c)| v * c).sum::<f64>();
-        }
-        integral += u * clock.step;
-    }
-}
-
-/// Adds the response of a second-order mode, `q+ = p q + (1 - |p|) u`, `y += a Re q + b Im q`.
-pub(crate) fn add_mode(
-    shape: &[f64],
-    residues: &[f64],
-    input: &[f64],
-    clock: &Clock,
-    outputs: &mut Series,
-) {
-    let w = std::f64::consts::TAU * shape[0] * clock.step;
-    let damping = shape[1].min(0.999);
-    let radius = (-damping * w).exp();
-    let angle = w * (1.0 - damping * damping).sqrt();
-    let (im, re) = (radius * angle.sin(), radius * angle.cos());
-    let gain = 1.0 - radius;
-    let (mut q_re, mut q_im) = (0.0, 0.0);
-    for (k, u) in input.iter().enumerate() {
-        for (output, residue) in outputs.iter_mut().zip(residues.chunks_exact(2)) {
-            output[k] += residue[0] * q_re + residue[1] * q_im;
-        }
-        (q_re, q_im) = (re * q_re - im * q_im + gain * u, re * q_im + im * q_re);
-    }
 }

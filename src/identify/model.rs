@@ -146,10 +146,12 @@ fn start(
             .one_step(&inputs, &outputs, Some(state))
             .ok()?
             .innovations;
-        let inverse = lambda.clone().cholesky()?.inverse();
-        let samples = innovations.first()?.len();
-        let of = |k: usize| DVector::from_fn(l, |o, _| innovations[o][k]);
-        Some((0..samples).map(|k| of(k).dot(&(&inverse * of(k)))).sum())
+        // `sum e' inv(Lambda) e` by the products of the innovations: one matrix, not one vector a sample.
+        let products = DMatrix::from_fn(l, l, |i, j| {
+            let both = innovations[i].iter().zip(&innovations[j]);
+            both.map(|(a, b)| a * b).sum::<f64>()
+        });
+        Some(lambda.clone().cholesky()?.solve(&products).trace())
     };
     let gain = cost(&fit.system, &plain)
         .zip(cost(&with_level, &moved))

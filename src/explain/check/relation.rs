@@ -252,7 +252,7 @@ pub(crate) fn between(recorded: &str, simulated: &str) -> Option<f64> {
             ("MPa", 1e6),
             ("bar", 1e5),
             ("mbar", 1e2),
-            ("psi", 6894.757_293),
+            ("psi", 6_894.757_293),
         ],
         &[
             ("m3/h", 1.0 / 3600.0),
