@@ -117,6 +117,8 @@ impl Records for ArrayRecords<'_> {
                 sha256: None,
                 samples: experiment.samples(),
                 start_time: 0.0,
+                origin: None,
+                reading: None,
             })
             .collect()
     }

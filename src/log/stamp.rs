@@ -169,8 +169,11 @@ fn take_apart(cell: &str) -> Option<Parts> {
     })
 }
 
+/// Its numbers as they stand, and their order where the date itself says it.
+type Date = ([i32; 3], Option<Order>);
+
 /// A date at the start: `2026-11-23`, `23.11.2026`, `11/23/2026`, `23-Nov-2026`, `20261123`.
-fn read_date(cell: &str) -> (Option<([i32; 3], Option<Order>)>, &str) {
+fn read_date(cell: &str) -> (Option<Date>, &str) {
     let none = (None, cell);
     // A weekday says nothing new.
     let text = match cell.split_once([' ', ',']) {

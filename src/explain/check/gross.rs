@@ -438,7 +438,8 @@ mod tests {
     fn a_long_dropout_is_found() {
         let (mut y, s) = recorded(5, 1500, false, 0.02);
         y[700..760].fill(0.0);
-        assert_eq!(gross(&y, &s).dropouts, Some((0.0, vec![700..760])));
+        let gone = 700..760;
+        assert_eq!(gross(&y, &s).dropouts, Some((0.0, vec![gone])));
     }
 
     #[test]

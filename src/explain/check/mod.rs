@@ -136,7 +136,7 @@ impl Checked {
         mask
     }
 
-    fn of_columns(&mut self, simulated: &mut Vec<Vec<Vec<f64>>>, allowed: &dyn Fn(&str) -> bool) {
+    fn of_columns(&mut self, simulated: &mut [Vec<Vec<f64>>], allowed: &dyn Fn(&str) -> bool) {
         self.copies(simulated);
         if !self.troubles.is_empty() {
             return;
@@ -208,8 +208,8 @@ impl Checked {
 
     fn wraps(&mut self, simulated: &mut [Vec<Vec<f64>>]) {
         for (r, (log, simulated)) in self.recordings.iter_mut().zip(simulated).enumerate() {
-            for o in 0..log.outputs.len() {
-                let found = wrap::wraps(&log.output_data[o], &simulated[o]);
+            for (o, simulated) in simulated.iter_mut().enumerate() {
+                let found = wrap::wraps(&log.output_data[o], simulated);
                 if found.0.is_none() && found.1.is_none() {
                     continue;
                 }
@@ -218,7 +218,7 @@ impl Checked {
                     log.output_data[o] = wrap.unwrapped;
                 }
                 if let Some(wrap) = found.1 {
-                    simulated[o] = wrap.unwrapped;
+                    *simulated = wrap.unwrapped;
                 }
             }
         }
@@ -244,12 +244,12 @@ impl Checked {
     }
 
     fn clocks(&mut self, simulated: &mut [Vec<Vec<f64>>]) {
-        for r in 0..self.recordings.len() {
+        for (r, simulated) in simulated.iter_mut().enumerate() {
             let log = &self.recordings[r];
             let pairs: Pairs = log
                 .output_data
                 .iter()
-                .zip(&simulated[r])
+                .zip(&*simulated)
                 .map(|(y, s)| (y.as_slice(), s.as_slice()))
                 .collect();
             let Some(drift) = clock::drift(&pairs) else {
@@ -257,14 +257,14 @@ impl Checked {
             };
             // A clock is at fault where its correction makes the simulation linear in the recorded inputs, or where it is
             // linear already and inputs that never rest leave it no other reason.
-            let before = misfit_of(log, &simulated[r]);
+            let before = misfit_of(log, simulated);
             let (cut, read) = if before < NOT_LINEAR {
                 if !never_rests(log) {
                     continue;
                 }
-                clock::recording_corrected(log, &simulated[r], drift)
+                clock::recording_corrected(log, simulated, drift)
             } else {
-                let (cut, read) = clock::simulation_corrected(log, &simulated[r], drift);
+                let (cut, read) = clock::simulation_corrected(log, simulated, drift);
                 let after = misfit_of(&cut, &read);
                 if after > INTERPOLATION || after > MUCH_MORE_LINEAR * before {
                     continue;
@@ -275,7 +275,7 @@ impl Checked {
             let trouble = words::drifts(log, r, drift, before < NOT_LINEAR);
             self.troubles.push(trouble);
             self.recordings[r] = cut;
-            simulated[r] = read;
+            *simulated = read;
         }
     }
 

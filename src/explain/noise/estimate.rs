@@ -181,8 +181,8 @@ fn bridged(v: &[f64], mask: &[bool], mean: f64) -> Vec<f64> {
         if from > 0 && k < out.len() && k - from <= SHORT_GAP {
             let (a, b) = (out[from - 1], out[k]);
             let length = (k - from + 1) as f64;
-            for i in from..k {
-                out[i] = a + (b - a) * (i - from + 1) as f64 / length;
+            for (i, value) in out[from..k].iter_mut().enumerate() {
+                *value = a + (b - a) * (i + 1) as f64 / length;
             }
         }
     }

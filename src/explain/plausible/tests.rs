@@ -196,7 +196,7 @@ fn other_parameters_must_not_do_significantly_better() {
     with(
         spring(vec![effect("cubic_stiffness", "")]),
         &[0.1],
-        |_, fit| {
+        |problem, fit| {
             let mut free = fit.clone();
             free.structure.plant_free = true;
             free.free = fit.free + 4;
@@ -211,17 +211,27 @@ fn other_parameters_must_not_do_significantly_better() {
                 (18.7, false, false),
             ] {
                 free.deviance = fit.deviance - better;
-                assert_eq!(reaches(fit, &free), reached, "{better}");
+                assert_eq!(reaches(fit, &free, false), reached, "{better}");
                 assert_eq!(
-                    plant_may_stay(&ranked(fit), &[ranked(&free)]),
+                    plant_may_stay(problem, &ranked(fit), &[ranked(&free)], None),
                     stays,
                     "{better}"
                 );
-                assert!(plant_may_stay(&ranked(&free), &[ranked(fit)]));
+                assert!(plant_may_stay(
+                    problem,
+                    &ranked(&free),
+                    &[ranked(fit)],
+                    None
+                ));
             }
             // The same effect at another place says nothing of this one.
             free.structure.effects[0].channel = 1;
-            assert!(plant_may_stay(&ranked(fit), &[ranked(&free)]));
+            assert!(plant_may_stay(
+                problem,
+                &ranked(fit),
+                &[ranked(&free)],
+                None
+            ));
         },
     );
 }

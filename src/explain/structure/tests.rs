@@ -1,6 +1,7 @@
 use approx::assert_abs_diff_eq;
 
 use super::*;
+use crate::explain::coordinates::Derivatives;
 use crate::explain::effects;
 
 const N: usize = 60;
