@@ -8,7 +8,7 @@ use crate::explain::fixtures::{SAMPLES, effect, recorded, spring};
 use crate::explain::structure::Structure;
 
 /// Of the law.
-const SIZE: f64 = 300.0;
+const SIZE: f64 = 600.0;
 
 /// A linear plant, all its numbers free.
 fn linear() -> Structure {

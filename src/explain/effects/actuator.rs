@@ -66,8 +66,9 @@ pub(super) static ENTRIES: &[Definition] = &[
         name: "dead zone of the input with an end of its own on each side",
         equation: "u_eff = u - clamp(u, lower_end, upper_end)",
         parameters: &[
-            Parameter::real("lower_end", Unit::Input),
-            Parameter::real("upper_end", Unit::Input),
+            // Zero lies within: elsewhere it would be an offset of the input.
+            Parameter::between("lower_end", Unit::Input, -1e12, 0.0),
+            Parameter::between("upper_end", Unit::Input, 0.0, 1e12),
         ],
         mimics: &[],
         linear: &[],

@@ -101,7 +101,11 @@ impl Jacobian {
         let mut gradient = self.columns.tr_mul(&target);
         let m = self.used.len();
         let scale: Vec<f64> = (0..m)
-            .map(|i| curvature[(i, i)].sqrt().max(1e-300))
+            // Of what moves nothing in these rows nothing is known: the ridge alone holds it.
+            .map(|i| match curvature[(i, i)].sqrt() {
+                scale if scale > 1e-140 => scale,
+                _ => 1.0,
+            })
             .collect();
         for i in 0..m {
             for j in 0..m {

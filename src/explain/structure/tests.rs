@@ -64,13 +64,13 @@ fn data() -> Data {
     }
 }
 
-/// The recursion as it is written in books, with a force `w(x, x without it)` through `direction`.
+/// The recursion as it is written in books, with a force `w(x, x without it, u)` through `direction`.
 fn written_out(
     plant: &Plant,
     x0: &[f64],
     inputs: &Series,
     direction: &[f64],
-    w: impl Fn(&[f64], &[f64]) -> f64,
+    w: impl Fn(&[f64], &[f64], &[f64]) -> f64,
 ) -> Series {
     let (n, r) = (plant.states, plant.inputs);
     let mut x = x0.to_vec();
@@ -89,7 +89,7 @@ fn written_out(
                 state + input
             })
             .collect();
-        let force = w(&x, &free);
+        let force = w(&x, &free, &u);
         x = free
             .iter()
             .zip(direction)
@@ -170,15 +170,20 @@ fn a_simulation_is_the_recursion() {
     // The force resists: it enters with the sign that slows what the input drives.
     let rows = Functionals::new(plant);
     let signal = rows.of(plant, Signal::Output(0));
-    let sign = matched_sign(plant, &signal.rate, 1);
+    let sign = matched_sign(plant, &signal.forward, 1);
     let direction: Vec<f64> = plant.b_column(1).iter().map(|b| sign * 0.005 * b).collect();
     for (s, segment) in data.segments.iter().enumerate() {
         let mut inputs = segment.inputs.clone();
         inputs[0].iter_mut().for_each(|u| *u *= 0.8);
-        let position = |x: &[f64]| dot(&signal.position, x);
-        let mut wanted = written_out(plant, &free.initial[s], &inputs, &direction, |x, free| {
-            -(0.5 * (position(x) + position(free))).powi(3)
-        });
+        let position =
+            |x: &[f64], u: &[f64]| dot(&signal.position, x) + dot(&signal.position_feedthrough, u);
+        let mut wanted = written_out(
+            plant,
+            &free.initial[s],
+            &inputs,
+            &direction,
+            |x, free, u| -(0.5 * (position(x, u) + position(free, u))).powi(3),
+        );
         wanted[1].iter_mut().for_each(|y| *y += 0.7);
         same(&simulated[2 * s..2 * s + 2], &wanted);
     }

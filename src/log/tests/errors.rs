@@ -138,7 +138,7 @@ fn roles_that_cannot_be_told() {
         read("t,motor speed,pose\n0,1,2\n"),
         &["`--inputs 'motor speed' --outputs pose`"],
     );
-    fails(read("t~u~y\n0~1~2\n"), &["`t~u~y`", "separated by commas"]);
+    fails(read("t~u~y\n0~1~2\n"), &["`t~u~y`", "--inputs a,b"]);
     // Blanks separate as well.
     fails(read("t u y\n0 1 2\n"), &["1 samples", "--dt"]);
     fails(
