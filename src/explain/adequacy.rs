@@ -101,13 +101,19 @@ pub(crate) fn adequacy(
     given: &Fit,
     before: Option<&Fit>,
 ) -> Option<Adequacy> {
+    adequacy_under(Colours::Few, problem, fit, given, before)
+}
+
+/// The same under noise of some of `colours`.
+fn adequacy_under(
+    colours: Colours,
+    problem: &Problem,
+    fit: &Fit,
+    given: &Fit,
+    before: Option<&Fit>,
+) -> Option<Adequacy> {
     let mut fit = fit.clone();
-    let noise = Noise::estimate(
-        &fit.residual,
-        problem.data.outputs,
-        &problem.mask,
-        Colours::Few,
-    );
+    let noise = Noise::estimate(&fit.residual, problem.data.outputs, &problem.mask, colours);
     let sensitivities = fit.sensitivities(problem);
     let bench = Bench::new(problem, &fit, &noise, sensitivities)?;
     let mut tests = Vec::new();

@@ -47,6 +47,9 @@ const VALUES_A_COEFFICIENT: usize = 12;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Colours {
     White,
+    /// An autoregression of order one, in which hardly anything hides.
+    #[cfg(test)]
+    First,
     /// Autoregressions of order two at most, and mixed ones up to (2, 2): a long one learns slow misfit as colour.
     Few,
     All,
@@ -56,6 +59,8 @@ impl Colours {
     fn most_order(self) -> usize {
         match self {
             Self::White => 0,
+            #[cfg(test)]
+            Self::First => 1,
             Self::Few => 2,
             Self::All => MOST_ORDER,
         }
@@ -64,6 +69,8 @@ impl Colours {
     fn mixed(self) -> &'static [(usize, usize)] {
         match self {
             Self::White => &[],
+            #[cfg(test)]
+            Self::First => &[],
             Self::Few => &MIXED[..3],
             Self::All => &MIXED,
         }

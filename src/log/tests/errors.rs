@@ -154,7 +154,7 @@ fn roles_that_cannot_be_told() {
         read("0,5;1,5;2,5\n"),
         &["the columns are `1`, `2`, `3` (", "no header"],
     );
-    fails(read("0.5,,nan\n"), &["looks like data"]);
+    fails(read("0.5,,nan\n"), &["no header"]);
     fails(read_as(csv, &roles("force", "")), &["no outputs"]);
     fails(
         read_as(csv, &roles("forse", "angle")),
