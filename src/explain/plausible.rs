@@ -31,6 +31,10 @@ const BREAKAWAY: f64 = 0.1;
 /// Magnitudes that differ by less are one.
 const ONE_MAGNITUDE: f64 = 0.01;
 
+/// A loop that closes within a smaller share of the travel is dry friction with elastic contacts and no hysteresis of the
+/// material (presliding is micrometres of a travel of millimetres: Armstrong-Helouvry, Dupont and Canudas de Wit 1994, sec. 3).
+const RESOLVED_LOOP: f64 = 0.01;
+
 /// A motion that is in contact for longer than this share of the time has no stop but another plant.
 const MOSTLY_FREE: f64 = 0.5;
 
@@ -199,6 +203,7 @@ pub(crate) fn sane(problem: &Problem, fit: &Fit) -> bool {
                 }
                 ("damping", _) if effect.definition.id == "extra_mode" => *v < RESONANT,
                 ("presliding_distance", _) => *v < 0.5 * travel(problem, fit, index),
+                ("yield_distance", _) => *v > RESOLVED_LOOP * travel(problem, fit, index),
                 ("breakaway_excess", _) => *v > BREAKAWAY,
                 ("stribeck_velocity", _) => *v < 1.5 * speed_scale(problem, fit, index),
                 _ => true,

@@ -24,6 +24,8 @@ pub(crate) enum More {
     Numbers(&'static [f64]),
     /// Breakaway excess and Stribeck velocity.
     Breakaway,
+    /// Shares of a typical speed.
+    Speed(&'static [f64]),
     /// Multiples of the sample time.
     Samples(&'static [f64]),
     /// Shares of the travel.
@@ -37,6 +39,11 @@ pub(crate) const REFINEMENTS: &[Refinement] = &[
         simple: ("coulomb_friction", ""),
         rich: ("stribeck_friction", ""),
         more: More::Breakaway,
+    },
+    Refinement {
+        simple: ("coulomb_friction", ""),
+        rich: ("coulomb_friction", "smooth"),
+        more: More::Speed(&[0.005, 0.05]),
     },
     Refinement {
         simple: ("coulomb_friction", "presliding"),
@@ -178,6 +185,10 @@ pub(crate) fn derived(
             More::Travel(shares) => {
                 let size = travel(problem, &best.fit, best.fit.structure.effects.len() - 1);
                 shares.iter().map(|v| vec![(v * size).ln()]).collect()
+            }
+            More::Speed(shares) => {
+                let speed = speed_scale(problem, &best.fit, best.fit.structure.effects.len() - 1);
+                shares.iter().map(|v| vec![(v * speed).ln()]).collect()
             }
             More::Breakaway => {
                 let speed = speed_scale(problem, &best.fit, best.fit.structure.effects.len() - 1);
