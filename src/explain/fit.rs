@@ -151,19 +151,30 @@ impl Fit {
         let simulated = structure.simulate(&theta, problem.data)?;
         let residual = problem.data.residual(&simulated);
         let noise = problem.noise(&residual);
-        let deviance = noise.deviance(&residual, &problem.mask);
-        let free = structure.free_len() + noise.len();
-        let steps = slopes::first_steps(&theta);
-        Some(Self {
+        Some(Self::under(
+            problem, structure, theta, noise, simulated, residual,
+        ))
+    }
+
+    /// The fit of these numbers, whose simulation and residual are known, under `noise`.
+    fn under(
+        problem: &Problem,
+        structure: Structure,
+        theta: Vec<f64>,
+        noise: Noise,
+        simulated: Series,
+        residual: Series,
+    ) -> Self {
+        Self {
+            deviance: noise.deviance(&residual, &problem.mask),
+            free: structure.free_len() + noise.len(),
+            steps: slopes::first_steps(&theta),
             structure,
             theta,
             noise,
-            deviance,
-            free,
             simulated,
             residual,
-            steps,
-        })
+        }
     }
 
     /// Fits all free numbers from `theta` on. `start` is the noise model of the first round; without it that of the
@@ -175,12 +186,13 @@ impl Fit {
         start: Option<&Noise>,
         effort: Effort,
     ) -> Option<Self> {
-        let mut fit = Self::at(problem, structure, theta)?;
-        fit.noise = match start {
+        let simulated = structure.simulate(&theta, problem.data)?;
+        let residual = problem.data.residual(&simulated);
+        let noise = match start {
             Some(start) => start.clone(),
-            None => Noise::white(&fit.residual, problem.data.outputs, &problem.mask),
+            None => Noise::white(&residual, problem.data.outputs, &problem.mask),
         };
-        fit.improved(problem, effort)
+        Self::under(problem, structure, theta, noise, simulated, residual).improved(problem, effort)
     }
 
     /// The fit of all free numbers that begins with those of this one, and with its noise model.

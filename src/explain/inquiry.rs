@@ -211,7 +211,21 @@ pub(crate) fn inquire(
     let uncertainty = known.uncertainty.as_ref();
     ranked.retain(|r| plant_may_stay(&problem, r, &ranked_all, uncertainty));
     // Plants of other classes, which no effect added to the linear one becomes.
-    ranked.extend(super::tanks::candidates(&problem, structure, allowed));
+    let linear = adequacy(
+        &problem,
+        finding.boring.best(count),
+        &finding.boring.given,
+        None,
+    );
+    if linear.is_none_or(|a| a.p_value < NOTHING_LEFT) {
+        let others: Vec<&Fit> = ranked
+            .iter()
+            .map(|r| &r.fit)
+            .chain([finding.boring.best(count)])
+            .collect();
+        let tanks = super::tanks::candidates(&problem, structure, allowed, &others);
+        ranked.extend(tanks);
+    }
     ranked.extend(super::rectified::candidates(&problem, structure, allowed));
     ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     finding.rivals = rivals(&ranked, base);

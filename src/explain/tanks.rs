@@ -23,6 +23,10 @@ const OPEN: f64 = 1e9;
 /// Step of the differences that the linear plant is taken from, as a share of the mean levels and of the mean input.
 const DIFFERENCE: f64 = 1e-5;
 
+/// Tanks that leave a larger mean square error than so many times another explanation's are not pursued: noise with colour
+/// makes up for less.
+const MOST_ERROR: f64 = 1.2;
+
 /// Share of the samples in which a pump with a bias may stand still.
 const MOST_IDLE: f64 = 0.1;
 
@@ -131,18 +135,25 @@ pub(crate) fn simulate(
 }
 
 /// Tanks that could have made the recording, fitted like any other explanation. None where they cannot: the test for
-/// that is a few passes over the samples.
+/// that is a few passes over the samples. `others` are explanations of other classes.
 pub(crate) fn candidates(
     problem: &Problem,
     given: &Structure,
     allowed: &(dyn Fn(&Definition) -> bool + Sync),
+    others: &[&Fit],
 ) -> Vec<Ranked> {
     let data = problem.data;
     // Beside effects that a simulator has already, a plant of another class has no meaning.
     if data.signals() != 1 || data.outputs != 1 || !given.known.is_empty() {
         return Vec::new();
     }
-    let Some(found) = found(problem) else {
+    let most = others
+        .iter()
+        .map(|fit| problem.mean_square(&fit.residual))
+        .fold(f64::INFINITY, f64::min)
+        * problem.scale[0].powi(2)
+        * MOST_ERROR;
+    let Some(found) = found(problem, most) else {
         return Vec::new();
     };
     // Where outflows in proportion to the levels do as well, nothing speaks for tanks.
@@ -175,14 +186,14 @@ pub(crate) fn candidates(
         .collect()
 }
 
-fn found(problem: &Problem) -> Option<CascadeFit> {
+fn found(problem: &Problem, most: f64) -> Option<CascadeFit> {
     let records: Vec<(&[f64], &[f64])> = problem
         .data
         .segments
         .iter()
         .map(|s| (s.inputs[0].as_slice(), s.outputs[0].as_slice()))
         .collect();
-    cascade::fit(&records, &problem.mask)
+    cascade::fit(&records, &problem.mask, most)
 }
 
 /// Whether the pump stands still in more of the recording than outliers make up. An input that is negative is a command

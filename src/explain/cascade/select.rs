@@ -64,9 +64,13 @@ pub(crate) struct CascadeFit {
     pub losses: Losses,
 }
 
-/// Fits cascades to records `(input, output)`; `mask` says which samples count. `None` when they cannot come from tanks.
-/// Takes time in proportion to the samples.
-pub(crate) fn fit(records: &[(&[f64], &[f64])], mask: &[Vec<bool>]) -> Option<CascadeFit> {
+/// Fits cascades to records `(input, output)`; `mask` says which samples count. `None` when they cannot come from tanks, or
+/// when those with every part leave a mean square error above `most`. Takes time in proportion to the samples.
+pub(crate) fn fit(
+    records: &[(&[f64], &[f64])],
+    mask: &[Vec<bool>],
+    most: f64,
+) -> Option<CascadeFit> {
     let view = View { records, mask };
     let pump_bias = view.applies()?;
     let (unit_u, unit_y) = view.units()?;
@@ -79,7 +83,7 @@ pub(crate) fn fit(records: &[(&[f64], &[f64])], mask: &[Vec<bool>]) -> Option<Ca
         mask: mask.to_vec(),
         count: view.counted().count(),
     };
-    let (best, losses) = select(&problem, pump_bias)?;
+    let (best, losses) = select(&problem, pump_bias, most / (unit_y * unit_y))?;
     let fit = CascadeFit::new(&problem, best, losses, (unit_u, unit_y), records);
     let mean = view.counted().map(|(_, y)| y).sum::<f64>() / fit.count as f64;
     let variance = view.counted().map(|(_, y)| (y - mean).powi(2)).sum::<f64>() / fit.count as f64;
@@ -125,8 +129,9 @@ fn exchanged(problem: &Problem, best: &Trial) -> Option<Trial> {
     (!kept).then_some(other)
 }
 
-/// All classes of outflow by the root, fullest first, and what is needed of those with linear outflow.
-fn select(problem: &Problem, pump_bias: bool) -> Option<(Trial, Losses)> {
+/// All classes of outflow by the root, fullest first, and what is needed of those with linear outflow. `None` when the fullest
+/// leaves a mean square error above `most`.
+fn select(problem: &Problem, pump_bias: bool, most: f64) -> Option<(Trial, Losses)> {
     let grid = problem.grid(Law::Root, pump_bias);
     let mut classes: Vec<Parts> = (0..8_u8)
         .map(|bits| Parts {
@@ -161,6 +166,10 @@ fn select(problem: &Problem, pump_bias: bool) -> Option<(Trial, Losses)> {
         let fuller = fits.iter().filter(|f| parts.within(f.cascade.parts));
         starts.extend(fuller.map(|f| problem.furnished(f, parts, BELOW_UPPER_RIM)));
         fits.extend(arrive(problem, starts));
+        // What the fullest class cannot do, no other can.
+        if fits.first()?.cost > most * problem.count as f64 {
+            return None;
+        }
     }
     // What a class can do, every fuller one can.
     for i in (0..fits.len()).rev() {

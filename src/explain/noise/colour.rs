@@ -6,7 +6,7 @@
 //! predictors of lower order; Kalman's filter from the stationary covariance). Started from zero instead, the first
 //! value of slow noise would count as many standard deviations.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{SMatrix, SVector};
 
 /// Largest autoregressive order.
 pub(crate) const MOST_ORDER: usize = 30;
@@ -26,14 +26,16 @@ pub(crate) struct Colour {
     pub ar: Vec<f64>,
     /// `c1, c2, ...`
     pub ma: Vec<f64>,
-    start: Vec<Start>,
+    /// The first values of a stretch: without moving average, coefficients of the values before each, newest first ...
+    predictors: Vec<Start<Vec<f64>>>,
+    /// ... with one, Kalman's gain.
+    gains: Vec<Start<[f64; MOST_MIXED]>>,
 }
 
-/// One of the first values of a stretch.
+/// How one of the first values of a stretch is whitened.
 #[derive(Debug, Clone, PartialEq)]
-struct Start {
-    /// Without moving average: coefficients of the values before it, newest first. With: Kalman's gain.
-    gain: Vec<f64>,
+struct Start<Gain> {
+    gain: Gain,
     /// One over the standard deviation of its prediction error, in standard deviations of `e`.
     scale: f64,
 }
@@ -42,13 +44,24 @@ impl Colour {
     /// `None` where the model is not stationary or not invertible.
     pub fn new(ar: Vec<f64>, ma: Vec<f64>) -> Option<Self> {
         let reflections = reflections(&ar)?;
-        let start = if ma.is_empty() {
-            lower_orders(&ar, &reflections)
+        let (predictors, gains) = if ma.is_empty() {
+            (lower_orders(&ar, &reflections), Vec::new())
         } else {
             self::reflections(&ma)?;
-            kalman(&ar, &ma)?
+            let gains = match ar.len().max(ma.len()) {
+                1 => kalman::<1>(&ar, &ma),
+                2 => kalman::<2>(&ar, &ma),
+                3 => kalman::<3>(&ar, &ma),
+                _ => None,
+            };
+            (Vec::new(), gains?)
         };
-        Some(Self { ar, ma, start })
+        Some(Self {
+            ar,
+            ma,
+            predictors,
+            gains,
+        })
     }
 
     pub fn len(&self) -> usize {
@@ -57,10 +70,11 @@ impl Colour {
 
     /// `log det` of the covariance of the first `samples` values, in units of the variance of `e`.
     pub fn log_determinant(&self, samples: usize) -> f64 {
-        self.start
-            .iter()
+        let predictors = self.predictors.iter().map(|s| s.scale);
+        predictors
+            .chain(self.gains.iter().map(|s| s.scale))
             .take(samples)
-            .map(|s| -2.0 * s.scale.ln())
+            .map(|scale| -2.0 * scale.ln())
             .sum()
     }
 
@@ -79,7 +93,7 @@ impl Colour {
 
     fn whiten_autoregression(&self, v: &[f64], gain: f64, out: &mut Vec<f64>) {
         let p = self.ar.len();
-        for (k, start) in self.start.iter().enumerate().take(v.len()) {
+        for (k, start) in self.predictors.iter().enumerate().take(v.len()) {
             let past: f64 = start
                 .gain
                 .iter()
@@ -121,7 +135,7 @@ impl Colour {
         c[..self.ma.len()].copy_from_slice(&self.ma);
         // Observer form: `v = x1 + e`, `xi+ = x(i+1) - ai v + ci e`.
         let mut x = [0.0; N];
-        for (v, start) in v.iter().zip(&self.start) {
+        for (v, start) in v.iter().zip(&self.gains) {
             let e = v - x[0];
             let predicted = x[0];
             for i in 0..N {
@@ -130,7 +144,7 @@ impl Colour {
             }
             out.push(gain * start.scale * e);
         }
-        for v in v.iter().skip(self.start.len()) {
+        for v in v.iter().skip(self.gains.len()) {
             let e = v - x[0];
             for i in 0..N {
                 let next = if i + 1 < N { x[i + 1] } else { 0.0 };
@@ -160,7 +174,7 @@ pub(super) fn reflections(polynomial: &[f64]) -> Option<Vec<f64>> {
 }
 
 /// Predictors of the orders below that of `ar`.
-fn lower_orders(ar: &[f64], reflections: &[f64]) -> Vec<Start> {
+fn lower_orders(ar: &[f64], reflections: &[f64]) -> Vec<Start<Vec<f64>>> {
     let mut steps = Vec::with_capacity(ar.len());
     let mut a: Vec<f64> = Vec::new();
     // Variance over that of `e`: the product of `1/(1 - k^2)` over what is still to come.
@@ -181,24 +195,19 @@ fn lower_orders(ar: &[f64], reflections: &[f64]) -> Vec<Start> {
 }
 
 /// Kalman's filter from the stationary covariance until it has settled.
-fn kalman(ar: &[f64], ma: &[f64]) -> Option<Vec<Start>> {
-    let n = match ar.len().max(ma.len()) {
-        n @ (1 | 2) => n,
-        n if n <= MOST_MIXED => MOST_MIXED,
-        _ => return None,
-    };
+fn kalman<const N: usize>(ar: &[f64], ma: &[f64]) -> Option<Vec<Start<[f64; MOST_MIXED]>>> {
     let at = |list: &[f64], i: usize| list.get(i).copied().unwrap_or(0.0);
-    let a = DMatrix::from_fn(n, n, |i, j| {
+    let a = SMatrix::<f64, N, N>::from_fn(|i, j| {
         (if j == 0 { -at(ar, i) } else { 0.0 }) + if j == i + 1 { 1.0 } else { 0.0 }
     });
-    let b = DVector::from_fn(n, |i, _| at(ma, i) - at(ar, i));
+    let b = SVector::<f64, N>::from_fn(|i, _| at(ma, i) - at(ar, i));
     // `P = A P A' + B B'` by doubling.
-    let (mut power, mut p) = (a.clone(), &b * b.transpose());
+    let (mut power, mut p) = (a, b * b.transpose());
     for _ in 0..40 {
-        let more = &power * &p * power.transpose();
+        let more = power * p * power.transpose();
         let done = more.norm() <= 1e-14 * p.norm();
         p += more;
-        power = &power * &power;
+        power *= power;
         if done {
             break;
         }
@@ -210,18 +219,18 @@ fn kalman(ar: &[f64], ma: &[f64]) -> Option<Vec<Start>> {
     for _ in 0..MOST_STEPS {
         // `v = x1 + e`, and `e` drives the state too.
         let variance = p[(0, 0)] + 1.0;
-        let gain = (&a * p.column(0) + &b) / variance;
+        let gain = (a * p.column(0) + b) / variance;
         let settled =
-            (variance - 1.0).abs() < SETTLED && (&gain - &b).norm() < SETTLED * (1.0 + b.norm());
+            (variance - 1.0).abs() < SETTLED && (gain - b).norm() < SETTLED * (1.0 + b.norm());
         if settled {
             return Some(steps);
         }
         steps.push(Start {
-            gain: gain.iter().copied().collect(),
+            gain: std::array::from_fn(|i| if i < N { gain[i] } else { 0.0 }),
             scale: variance.sqrt().recip(),
         });
-        p = &a * &p * a.transpose() + &b * b.transpose() - &gain * gain.transpose() * variance;
-        p = (&p + p.transpose()) * 0.5;
+        p = a * p * a.transpose() + b * b.transpose() - gain * gain.transpose() * variance;
+        p = (p + p.transpose()) * 0.5;
     }
     Some(steps)
 }

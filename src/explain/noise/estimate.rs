@@ -5,6 +5,8 @@
 //! over the data. Starts are those of Hannan and Rissanen (1982) and a grid of slow poles. The choice among all is by
 //! Schwarz's criterion with the exact likelihood of each.
 
+use std::cell::Cell;
+
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use realfft::RealFftPlanner;
@@ -386,6 +388,11 @@ impl Starts {
     }
 }
 
+thread_local! {
+    /// Residuals of one search have the same few lengths: each is planned once a thread.
+    static PLANNER: Cell<RealFftPlanner<f64>> = Cell::new(RealFftPlanner::new());
+}
+
 /// A periodogram, averaged over bins.
 struct Bins {
     /// Ordinates in each.
@@ -408,7 +415,7 @@ impl Bins {
         let m = edges.len();
         let (mut counts, mut powers, mut places) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
         let share = filled.iter().map(Vec::len).sum::<usize>() as f64 / count as f64;
-        let mut planner = RealFftPlanner::<f64>::new();
+        let mut planner = PLANNER.take();
         for v in filled.iter().filter(|v| v.len() >= 16) {
             let n = v.len();
             let transform = planner.plan_fft_forward(n);
@@ -428,6 +435,7 @@ impl Bins {
                 places[bin] += weight * place;
             }
         }
+        PLANNER.set(planner);
         let mut bins = Self {
             count: Vec::with_capacity(m),
             power: Vec::with_capacity(m),
@@ -454,34 +462,34 @@ impl Bins {
             .fold(Complex64::new(1.0, 0.0), |sum, (p, t)| sum + t * *p)
     }
 
-    /// Power over what the model says of its shape.
-    fn ratios(&self, ar: &[f64], ma: &[f64]) -> (Vec<f64>, f64) {
-        let mut logarithms = 0.0;
-        let ratios = self
-            .turns
+    /// Shape that the model gives the spectrum in each bin.
+    fn shapes(&self, ar: &[f64], ma: &[f64]) -> Vec<f64> {
+        self.turns
             .iter()
-            .zip(&self.power)
-            .zip(&self.count)
-            .map(|((turns, power), count)| {
-                let shape = Self::value(ma, turns).norm_sqr() / Self::value(ar, turns).norm_sqr();
-                logarithms += count * shape.ln();
-                power / shape
-            })
-            .collect();
-        (ratios, logarithms)
+            .map(|turns| Self::value(ma, turns).norm_sqr() / Self::value(ar, turns).norm_sqr())
+            .collect()
+    }
+
+    /// Variance of the innovations of largest likelihood, for these shapes.
+    fn variance(&self, shapes: &[f64]) -> f64 {
+        let ratios = self.power.iter().zip(shapes).zip(&self.count);
+        let sum: f64 = ratios.map(|((power, shape), m)| m * power / shape).sum();
+        sum / self.total()
+    }
+
+    fn total(&self) -> f64 {
+        self.count.iter().sum()
     }
 
     /// Twice Whittle's log likelihood, negative, with the best variance.
     fn deviance(&self, ar: &[f64], ma: &[f64]) -> Option<f64> {
-        let (ratios, logarithms) = self.ratios(ar, ma);
-        let total: f64 = self.count.iter().sum();
-        let variance = ratios
+        let shapes = self.shapes(ar, ma);
+        let logarithms: f64 = shapes
             .iter()
             .zip(&self.count)
-            .map(|(r, m)| r * m)
-            .sum::<f64>()
-            / total;
-        let deviance = 2.0 * (logarithms + total * variance.ln());
+            .map(|(s, m)| m * s.ln())
+            .sum();
+        let deviance = 2.0 * (logarithms + self.total() * self.variance(&shapes).ln());
         deviance.is_finite().then_some(deviance)
     }
 
@@ -490,45 +498,50 @@ impl Bins {
         let (p, m) = (ar.len(), ar.len() + ma.len());
         let mut least = self.deviance(&ar, &ma)?;
         let mut damping = 1e-3;
-        let total: f64 = self.count.iter().sum();
+        let total = self.total();
+        // Derivatives of the log of each shape; there are none beyond `m`.
+        let mut rows = vec![[0.0; 2 * MOST_MIXED]; self.count.len()];
         for _ in 0..STEPS {
-            let (ratios, _) = self.ratios(&ar, &ma);
-            let variance = ratios
-                .iter()
-                .zip(&self.count)
-                .map(|(r, m)| r * m)
-                .sum::<f64>()
-                / total;
-            let mut curvature = DMatrix::<f64>::zeros(m, m);
-            let mut gradient = DVector::<f64>::zeros(m);
+            let shapes = self.shapes(&ar, &ma);
+            let variance = self.variance(&shapes);
             // The derivatives less their mean: the variance takes that up.
-            let mut rows: Vec<DVector<f64>> = Vec::with_capacity(ratios.len());
-            let mut mean = DVector::<f64>::zeros(m);
-            for (turns, count) in self.turns.iter().zip(&self.count) {
+            let mut mean = [0.0; 2 * MOST_MIXED];
+            for ((row, turns), count) in rows.iter_mut().zip(&self.turns).zip(&self.count) {
                 let (a, c) = (Self::value(&ar, turns).inv(), Self::value(&ma, turns).inv());
-                let row = DVector::from_fn(m, |i, _| {
-                    if i < p {
-                        -2.0 * (turns[i] * a).re
-                    } else {
-                        2.0 * (turns[i - p] * c).re
-                    }
-                });
-                mean += &row * (*count / total);
-                rows.push(row);
+                for (value, turn) in row[..p].iter_mut().zip(turns) {
+                    *value = -2.0 * (turn * a).re;
+                }
+                for (value, turn) in row[p..m].iter_mut().zip(turns) {
+                    *value = 2.0 * (turn * c).re;
+                }
+                for (mean, value) in mean.iter_mut().zip(row.iter()) {
+                    *mean += value * count / total;
+                }
             }
-            for ((row, ratio), count) in rows.iter().zip(&ratios).zip(&self.count) {
-                let row = row - &mean;
-                gradient += &row * (count * (ratio / variance - 1.0));
-                curvature += &row * row.transpose() * *count;
+            let mut curvature = [[0.0; 2 * MOST_MIXED]; 2 * MOST_MIXED];
+            let mut gradient = [0.0; 2 * MOST_MIXED];
+            for (i, row) in rows.iter_mut().enumerate() {
+                let count = self.count[i];
+                let excess = count * (self.power[i] / shapes[i] / variance - 1.0);
+                for (value, mean) in row.iter_mut().zip(&mean) {
+                    *value -= mean;
+                }
+                for (i, value) in row.iter().enumerate() {
+                    gradient[i] += value * excess;
+                    for (sum, other) in curvature[i].iter_mut().zip(row.iter()) {
+                        *sum += count * value * other;
+                    }
+                }
             }
             let before = least;
             for _ in 0..8 {
-                let mut damped = curvature.clone();
-                for i in 0..m {
-                    damped[(i, i)] *= 1.0 + damping;
-                    damped[(i, i)] += 1e-12;
-                }
-                let step = damped.cholesky()?.solve(&gradient);
+                let damped = DMatrix::from_fn(m, m, |i, j| {
+                    curvature[i][j] * if i == j { 1.0 + damping } else { 1.0 }
+                        + if i == j { 1e-12 } else { 0.0 }
+                });
+                let step = damped
+                    .cholesky()?
+                    .solve(&DVector::from_column_slice(&gradient[..m]));
                 let next_ar: Vec<f64> = ar.iter().zip(step.iter()).map(|(a, s)| a + s).collect();
                 let next_ma: Vec<f64> = ma
                     .iter()

@@ -31,7 +31,8 @@ fn a_linear_plant_is_better_left_linear() {
 
 #[test]
 fn what_is_no_tank_is_left_alone() {
-    let none = |u: &[f64], y: &[f64]| fit(&[(u, y)], &[vec![true; y.len()]]).is_none();
+    let none =
+        |u: &[f64], y: &[f64]| fit(&[(u, y)], &[vec![true; y.len()]], f64::INFINITY).is_none();
     let u = staircase(500, 20, 10.0, 3);
     let y = DRY.run(&u, [0.3, 0.4]);
     assert!(!none(&u, &noisy(&y, 0.05, 1)));
@@ -61,7 +62,9 @@ fn what_is_no_tank_is_left_alone() {
     assert!(
         none(&u, &vec![1.0; 500]) && none(&vec![0.0; 500], &y) && none(&u, &vec![f64::NAN; 500])
     );
-    assert!(fit(&[], &[]).is_none() && fit(&[(&u, &y)], &[]).is_none());
+    assert!(
+        fit(&[], &[], f64::INFINITY).is_none() && fit(&[(&u, &y)], &[], f64::INFINITY).is_none()
+    );
 }
 
 /// Gradients carried through the simulation against differences of the cost, with all parts acting.

@@ -101,7 +101,7 @@ fn noisy(y: &[f64], deviation: f64, seed: u64) -> Vec<f64> {
 }
 
 fn fit_one(u: &[f64], y: &[f64]) -> CascadeFit {
-    fit(&[(u, y)], &[vec![true; y.len()]]).expect("tanks")
+    fit(&[(u, y)], &[vec![true; y.len()]], f64::INFINITY).expect("tanks")
 }
 
 /// Largest distance of the numbers that are in the fit from the truth, in standard deviations.
@@ -292,7 +292,12 @@ fn commands_about_an_operating_point() {
         .zip(&mask)
         .filter(|(_, keep)| !**keep)
         .for_each(|(z, _)| *z = f64::NAN);
-    let fit = fit(&[(&u, &y), (&v, &z)], &[vec![true; 500], mask]).expect("tanks");
+    let fit = fit(
+        &[(&u, &y), (&v, &z)],
+        &[vec![true; 500], mask],
+        f64::INFINITY,
+    )
+    .expect("tanks");
     assert!(
         fit.cascade.parts.pump_bias && found(&fit) == [true, false, false],
         "{:?}",
