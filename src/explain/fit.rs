@@ -33,10 +33,15 @@ pub(crate) struct Effort {
 }
 
 impl Effort {
+    /// To see whether a candidate leads anywhere.
+    pub const GLANCE: Self = Self {
+        derivatives: 1,
+        ..Self::SCOUT
+    };
     /// To see what deserves more.
     pub const SCOUT: Self = Self {
         rounds: 1,
-        derivatives: 3,
+        derivatives: 2,
         steps_each: 4,
         updates: true,
         settled: 0.5,

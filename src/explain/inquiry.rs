@@ -258,10 +258,7 @@ pub(crate) fn inquire(
         };
         if let Some(direct) = with_feedthrough(&problem, &fit) {
             fit = direct;
-            ranked_all.push(Ranked {
-                criterion: fit.criterion(count),
-                fit: fit.clone(),
-            });
+            ranked_all.push(Ranked::new(&problem, fit.clone()));
         }
         if let Some(one) = in_one_recording(&problem, &fit) {
             fit = one;

@@ -153,10 +153,7 @@ pub(crate) fn add_free_twins(
             }
             theta.extend_from_slice(&r.fit.theta[linear..]);
             let fit = Fit::run(problem, structure, theta, Some(&r.fit.noise), Effort::RANK)?;
-            Some(Ranked {
-                criterion: fit.criterion(count),
-                fit,
-            })
+            Some(Ranked::new(problem, fit))
         })
         .collect();
     for mut twin in twins {

@@ -127,11 +127,7 @@ pub(crate) fn candidates(
     if !given.known.is_empty() || !applies(data) {
         return Vec::new();
     }
-    let count = problem.count();
-    let ranked = |fit: Fit| Ranked {
-        criterion: fit.criterion(count),
-        fit,
-    };
+    let ranked = |fit: Fit| Ranked::new(problem, fit);
     let orders: Vec<usize> = ORDERS.collect();
     let mut alone: Vec<Ranked> = orders
         .par_iter()

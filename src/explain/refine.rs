@@ -138,7 +138,6 @@ pub(crate) fn derived(
     base: f64,
     allowed: &(dyn Fn(&Definition) -> bool + Sync),
 ) -> Vec<Ranked> {
-    let count = problem.count();
     // A curve without a form is no rival here: what it follows may be a law in its simplest form.
     let laws = ranked
         .iter()
@@ -212,10 +211,7 @@ pub(crate) fn derived(
         .filter_map(|(structure, theta, noise)| {
             Fit::run(problem, structure, theta, Some(&noise), Effort::RANK)
         })
-        .map(|fit| Ranked {
-            criterion: fit.criterion(count),
-            fit,
-        })
+        .map(|fit| Ranked::new(problem, fit))
         .collect()
 }
 
@@ -243,7 +239,6 @@ pub(crate) fn finer_steps(
     base: f64,
     allowed: &(dyn Fn(&Definition) -> bool + Sync),
 ) -> Vec<Ranked> {
-    let count = problem.count();
     let mut best: Vec<&Ranked> = ranked.iter().collect();
     best.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     let Some(least) = best.first().map(|r| r.criterion) else {
@@ -278,10 +273,7 @@ pub(crate) fn finer_steps(
                 Some(&r.fit.noise),
                 Effort::RANK,
             )?;
-            Some(Ranked {
-                criterion: fit.criterion(count),
-                fit,
-            })
+            Some(Ranked::new(problem, fit))
         })
         .collect();
     for refinements in [FINE_REFINEMENTS, REFINEMENTS, FURTHER] {

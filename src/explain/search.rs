@@ -10,6 +10,7 @@ use super::functionals::Functionals;
 use super::noise::Noise;
 use super::screen::{Lead, extended, screen};
 use super::structure::{Direction, Instance, Signal, Structure};
+use super::templates::CHANGE_TIMES;
 
 /// Effects that are fitted in full from each screening.
 const LEADS_EACH: usize = 6;
@@ -218,6 +219,15 @@ pub(crate) struct Ranked {
     pub criterion: f64,
 }
 
+impl Ranked {
+    pub fn new(problem: &Problem, fit: Fit) -> Self {
+        Self {
+            criterion: fit.criterion(problem.count()),
+            fit,
+        }
+    }
+}
+
 /// Screens around `bases` and fits what stands out, frozen and free; best first.
 pub(crate) fn single_effects(
     problem: &Problem,
@@ -256,16 +266,22 @@ pub(crate) fn single_effects(
         &frozen.structure.coordinates,
     );
     let mut jobs: Vec<(Structure, Vec<f64>)> = Vec::new();
-    for (index, lead) in &leads {
+    for (at, (index, lead)) in leads.iter().enumerate() {
+        let found_before = leads[..at]
+            .iter()
+            .any(|(before, other)| before != index && other.instance.is_same(&lead.instance));
         // What was found around a plant of another order has its numbers.
         if !one_plant {
             let basis = if *index == 0 { frozen } else { &boring.full };
             jobs.push(extended(&basis.structure, &basis.theta, lead));
             continue;
         }
-        jobs.push(extended(&frozen.structure, &frozen.theta, lead));
-        if boring.near.structure.adjusted > 0 {
-            jobs.push(extended(&boring.near.structure, &boring.near.theta, lead));
+        // Beside a plant that stays, where it was found makes no difference.
+        if !found_before {
+            jobs.push(extended(&frozen.structure, &frozen.theta, lead));
+            if boring.near.structure.adjusted > 0 {
+                jobs.push(extended(&boring.near.structure, &boring.near.theta, lead));
+            }
         }
         jobs.push(if *index == 0 {
             let full = &boring.full.structure;
@@ -283,41 +299,45 @@ pub(crate) fn single_effects(
     pursued(problem, jobs, PROMISING)
 }
 
-/// Fits structures from their starts: a few steps for all, more for the `most` that promise best; best first.
+/// Fits structures from their starts, best first: a first step for all; a few for those that then do well, and for the best
+/// form of each effect, because a first step compares forms of one law and not laws; more for the `most` that promise best.
 fn pursued(problem: &Problem, jobs: Vec<(Structure, Vec<f64>)>, most: usize) -> Vec<Ranked> {
-    let count = problem.count();
-    let mut scouted: Vec<Ranked> = jobs
+    let mut glanced: Vec<Ranked> = jobs
         .into_par_iter()
-        .filter_map(|(structure, start)| fit_lead(problem, structure, start, Effort::SCOUT))
-        .map(|fit| Ranked {
-            criterion: fit.criterion(count),
-            fit,
-        })
+        .filter_map(|(structure, start)| fit_lead(problem, structure, start, Effort::GLANCE))
+        .map(|fit| Ranked::new(problem, fit))
         .collect();
+    glanced.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let form = |r: &Ranked| {
+        let effect = r.fit.structure.effects.last().map(|e| e.definition.id);
+        (effect, r.fit.structure.plant_free)
+    };
+    let chosen: Vec<Ranked> = (0..glanced.len())
+        .filter(|&i| i < most || !glanced[..i].iter().any(|r| form(r) == form(&glanced[i])))
+        .map(|i| glanced[i].clone())
+        .collect();
+    let mut scouted = continued(problem, chosen, Effort::SCOUT);
     scouted.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     let mut promising: Vec<Ranked> = Vec::new();
     for r in scouted {
-        let effect = r.fit.structure.effects.last().map(|e| e.definition.id);
-        let forms = promising
-            .iter()
-            .filter(|p| p.fit.structure.effects.last().map(|e| e.definition.id) == effect)
-            .count();
-        if forms < FORMS_EACH && promising.len() < most {
+        let forms = promising.iter().filter(|p| form(p).0 == form(&r).0);
+        if forms.count() < FORMS_EACH && promising.len() < most {
             promising.push(r);
         }
     }
-    let mut ranked: Vec<Ranked> = promising
-        .into_par_iter()
-        .map(|r| match r.fit.improved(problem, Effort::RANK) {
-            Some(fit) if fit.deviance < r.fit.deviance => Ranked {
-                criterion: fit.criterion(count),
-                fit,
-            },
-            _ => r,
-        })
-        .collect();
+    let mut ranked = continued(problem, promising, Effort::RANK);
     ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     ranked
+}
+
+/// Each of `list` after more effort, where that helps.
+fn continued(problem: &Problem, list: Vec<Ranked>, effort: Effort) -> Vec<Ranked> {
+    list.into_par_iter()
+        .map(|r| match r.fit.improved(problem, effort) {
+            Some(fit) if fit.deviance < r.fit.deviance => Ranked::new(problem, fit),
+            _ => r,
+        })
+        .collect()
 }
 
 /// The best leads: so many effects, so many places of each.
@@ -419,12 +439,12 @@ fn scan(problem: &Problem, fit: &Fit, at: usize) -> Option<Vec<f64>> {
     let length = problem.data.segments[0].samples() as f64 * problem.data.sample_time;
     let mut best = fit.theta.clone();
     let mut least = fit.deviance;
-    let mut width = length / 20.0;
+    let mut width = length / CHANGE_TIMES as f64;
     while width > 0.5 * problem.data.sample_time {
         let centre = best[at];
-        for i in -6..=6 {
+        for i in [-3, -2, -1, 1, 2, 3] {
             let mut trial = best.clone();
-            trial[at] = centre + width * f64::from(i) / 6.0;
+            trial[at] = centre + width * f64::from(i) / 3.0;
             let Some(simulated) = fit.structure.simulate(&trial, problem.data) else {
                 continue;
             };
@@ -436,7 +456,7 @@ fn scan(problem: &Problem, fit: &Fit, at: usize) -> Option<Vec<f64>> {
                 best = trial;
             }
         }
-        width /= 4.0;
+        width /= 3.0;
     }
     Some(best)
 }

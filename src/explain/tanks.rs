@@ -160,7 +160,6 @@ pub(crate) fn candidates(
     if found.losses.outflow <= 0.0 || found.cascade.parts.pump_bias && idles(data, &found) {
         return Vec::new();
     }
-    let count = problem.count();
     let brimless = {
         let mut other = found.clone();
         other.cascade.parts.upper_overflow = false;
@@ -178,10 +177,7 @@ pub(crate) fn candidates(
         .filter_map(|(structure, theta)| {
             let mut fit = Fit::run(problem, structure, theta, None, Effort::FINAL)?;
             fit.structure.coordinates = Arc::new(linearised(data, &fit.structure, &fit.theta));
-            Some(Ranked {
-                criterion: fit.criterion(count),
-                fit,
-            })
+            Some(Ranked::new(problem, fit))
         })
         .collect()
 }
