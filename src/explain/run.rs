@@ -67,6 +67,8 @@ struct SizedForce<'a, const N: usize> {
     direction: [f64; N],
     position_gain: f64,
     memory: [f64; 3],
+    /// Whether the inputs act on the position or on the rate without delay.
+    direct: bool,
     /// What the inputs of the sample add to the position and to the rate, and the one that the force is matched with.
     position_input: f64,
     rate_input: f64,
@@ -124,6 +126,11 @@ fn sized<const N: usize>(
                 .map(|(c, b)| c * b)
                 .sum(),
             memory: [0.0; 3],
+            direct: force
+                .position_feedthrough
+                .iter()
+                .chain(&force.rate_feedthrough)
+                .any(|gain| *gain != 0.0),
             position_input: 0.0,
             rate_input: 0.0,
             input: 0.0,
@@ -150,6 +157,9 @@ fn sized<const N: usize>(
         }
         for f in &mut forces {
             f.input = inputs.get(f.force.input).map_or(0.0, |u| u[k]);
+            if !f.direct {
+                continue;
+            }
             let direct = |gains: &[f64]| -> f64 {
                 gains
                     .iter()

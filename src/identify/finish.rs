@@ -2,10 +2,12 @@
 
 use super::candidate::{Candidate, cost_p_value};
 use super::data::Data;
+use super::dead_time::Evidence;
 use super::error::IdentifyError;
 use super::fit::Fit;
 use super::method::{Estimated, Method};
 use super::options::{CovarianceKind, Options, Order, Polish};
+use super::order::OrderEvidence;
 use super::polish::{Effort, Polished, coefficient_cost, polish};
 use super::resolution::{Stepped, coarse};
 use super::scaling;
@@ -274,8 +276,20 @@ pub fn finish(
         levels: data.levels.clone(),
         delays: data.delays().to_vec(),
         first_trend: data.trend(0).clone(),
+        dead_time: Evidence::new(
+            &varx,
+            chosen_evidence(&summary).and_then(|e| e.schwarz),
+            factor.inputs,
+            &data.scale[factor.inputs..],
+        ),
         summary,
     })
+}
+
+/// What speaks for and against the order that was chosen.
+fn chosen_evidence(summary: &Summary) -> Option<&OrderEvidence> {
+    let orders = &summary.diagnostics.orders;
+    orders.iter().find(|e| e.order == summary.order)
 }
 
 /// A stable system, its covariance when it was polished, and what it cost.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::data::Data;
+use super::dead_time::{self, Evidence};
 use super::error::IdentifyError;
 use super::finish::{Chosen, finish};
 use super::free_run::{FreeRun, by_free_run, many_states};
@@ -45,13 +46,24 @@ pub struct Fit {
     pub first_trend: Trend,
     /// How it came about.
     pub summary: Summary,
+    /// What speaks for a dead time.
+    pub(super) dead_time: Evidence,
 }
 
-/// Fits a model to recordings.
+/// Fits a model to recordings; where no delay is given, inputs that do nothing for some samples are shifted.
 ///
 /// # Errors
 /// [`IdentifyError`] says what is wrong with the recordings or the options.
 pub fn fit(records: &mut dyn Records, options: &Options) -> Result<Fit, IdentifyError> {
+    let plain = fit_aligned(records, options)?;
+    Ok(dead_time::shifted(records, options, &plain).unwrap_or(plain))
+}
+
+/// Fits a model with the delays that `options` give.
+pub(super) fn fit_aligned(
+    records: &mut dyn Records,
+    options: &Options,
+) -> Result<Fit, IdentifyError> {
     let (r, outputs) = (records.inputs().len(), records.outputs().len());
     let q = r + outputs;
     let lags = lags_needed(options, r, outputs)?;

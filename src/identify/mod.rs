@@ -5,6 +5,7 @@
 //! | file | step | source |
 //! |---|---|---|
 //! | `records`, `delay`, `data` | recordings, streamed once, aligned, as moments | |
+//! | `dead_time` | inputs that do nothing for some samples | |
 //! | `reduced` | recordings of which only moments are left: pieces of a cluster's work | |
 //! | `horizon` | past window by Akaike's criterion, future window | |
 //! | `varx` | the high-order vector ARX model | van Wingerden (22)-(23) |
@@ -31,6 +32,7 @@
 pub mod baselines;
 mod candidate;
 mod data;
+mod dead_time;
 mod delay;
 mod error;
 mod finish;

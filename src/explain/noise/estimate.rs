@@ -94,18 +94,19 @@ pub(super) fn colour(
         .step_by(outputs)
         .map(|(v, m)| (v.as_slice(), m.as_slice()))
         .collect();
-    let kept = || {
-        stretches
-            .iter()
-            .flat_map(|(v, m)| v.iter().zip(*m).filter(|(_, m)| **m).map(|(v, _)| *v))
-    };
-    let n = kept().count();
+    let (mut n, mut sum) = (0, 0.0);
+    for (v, mask) in &stretches {
+        super::each_stretch(mask, |from, to| {
+            n += to - from;
+            sum += v[from..to].iter().sum::<f64>();
+        });
+    }
     let most = colours.most_order().min(n / VALUES_A_COEFFICIENT);
     if most == 0 {
         return Colour::default();
     }
     // About the mean: a constant is an offset to be explained, not colour with a pole at one.
-    let mean = kept().sum::<f64>() / n as f64;
+    let mean = sum / n as f64;
     let filled: Vec<Vec<f64>> = stretches.iter().map(|(v, m)| bridged(v, m, mean)).collect();
     let lags = if colours.mixed().is_empty() {
         most

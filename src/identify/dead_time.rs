@@ -1,0 +1,216 @@
+//! Dead time of the inputs: samples over which an input does nothing yet.
+//!
+//! A dead time of `d` samples is `d` states for each input in a state-space model, and none where the input is shifted. In
+//! the vector ARX model it is `d` leading coefficients of the input that are zero, whatever the noise and also in closed
+//! loop, because a predictor of the form `H^-1 G u + (1 - H^-1) y` has the dead time of `G`. Leading coefficients that
+//! are jointly insignificant propose a dead time; the model of the shifted input decides by Schwarz's criterion.
+
+use nalgebra::DMatrix;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::fit::{Fit, fit_aligned};
+use super::options::Options;
+use super::records::Records;
+use super::varx::Varx;
+use crate::linalg::{cholesky_upper, solve_upper_transposed};
+
+/// Significance of the leading coefficients from which a dead time has ended.
+const LEVEL: f64 = 0.01;
+/// By how much Schwarz's criterion must fall: "very strong" evidence (Kass and Raftery 1995).
+const NEEDED: f64 = 10.0;
+
+/// Leading lags of each input whose coefficients are jointly zero at [`LEVEL`]; 0 for an input without any significant one.
+fn proposed(varx: &Varx, inputs: usize) -> Vec<usize> {
+    let none = vec![0; inputs];
+    if varx.dependent || varx.feedthrough {
+        return none;
+    }
+    let Ok(upper) = cholesky_upper(&varx.innovation_covariance) else {
+        return none;
+    };
+    (0..inputs)
+        .map(|input| leading_zeros(varx, &upper, input).unwrap_or(0))
+        .collect()
+}
+
+/// Wald's test of the first lag, of the first two, and so on, until it rejects.
+fn leading_zeros(varx: &Varx, upper: &DMatrix<f64>, input: usize) -> Option<usize> {
+    let (m, l) = (varx.regressors(), varx.coefficients.nrows());
+    let q = m / varx.past;
+    // Coefficients and columns of `R^-T`, whose products are their covariance, in units of the innovations.
+    let mut coefficients = DMatrix::zeros(0, l);
+    let mut factors = DMatrix::zeros(m, 0);
+    for lag in 1..=varx.past {
+        let column = (varx.past - lag) * q + input;
+        let mut unit = DMatrix::zeros(m, 1);
+        unit[(column, 0)] = 1.0;
+        let whitened =
+            solve_upper_transposed(upper, &varx.coefficients.columns(column, 1).into_owned());
+        coefficients = coefficients.insert_row(lag - 1, 0.0);
+        coefficients
+            .row_mut(lag - 1)
+            .copy_from(&whitened.transpose());
+        factors = factors.insert_column(lag - 1, 0.0);
+        factors
+            .column_mut(lag - 1)
+            .copy_from(&solve_upper_transposed(&varx.regressor_factor, &unit));
+        let covariance = factors.tr_mul(&factors);
+        let statistic = coefficients
+            .tr_mul(&covariance.cholesky()?.solve(&coefficients))
+            .trace();
+        let p_value = ChiSquared::new((lag * l) as f64).ok()?.sf(statistic);
+        if p_value < LEVEL {
+            return Some(lag - 1);
+        }
+    }
+    None
+}
+
+/// What an identification says about the dead time of its inputs.
+#[derive(Debug, Clone)]
+pub(super) struct Evidence {
+    /// Leading lags of each input that do nothing.
+    pub proposed: Vec<usize>,
+    /// Schwarz's criterion of the model against its vector ARX model, where it was computed.
+    schwarz: Option<f64>,
+    /// `log det` of the innovation covariance of the vector ARX model in the user's units, by maximum likelihood.
+    log_determinant: f64,
+    /// Windows of the vector ARX model.
+    windows: usize,
+}
+
+impl Evidence {
+    /// Of a model whose criterion against `varx` is `schwarz`; `scale` are the divisors of the outputs.
+    pub fn new(varx: &Varx, schwarz: Option<f64>, inputs: usize, scale: &[f64]) -> Self {
+        let likeliest = &varx.sum_of_squares / varx.columns as f64;
+        let half = cholesky_upper(&likeliest).map_or(f64::NEG_INFINITY, |upper| {
+            upper.diagonal().iter().map(|d| d.ln()).sum::<f64>()
+        });
+        Self {
+            proposed: proposed(varx, inputs),
+            schwarz,
+            log_determinant: 2.0 * (half + scale.iter().map(|s| s.ln()).sum::<f64>()),
+            windows: varx.columns,
+        }
+    }
+
+    /// By how much Schwarz's criterion is smaller than that of `other`; `None` where one of them is not known.
+    fn gain_over(&self, other: &Self) -> Option<f64> {
+        let windows = self.windows.min(other.windows) as f64;
+        let criterion = |e: &Self| Some(e.schwarz? + windows * e.log_determinant);
+        Some(criterion(other)? - criterion(self)?).filter(|gain| gain.is_finite())
+    }
+}
+
+/// The model of inputs that are shifted by the dead time that `plain` proposes, where that is clearly better.
+pub(super) fn shifted(records: &mut dyn Records, options: &Options, plain: &Fit) -> Option<Fit> {
+    let known = !options.input_delay.is_empty() || records.reduced().is_some();
+    let delays = &plain.dead_time.proposed;
+    if known || delays.iter().all(|d| *d == 0) {
+        return None;
+    }
+    let options = Options {
+        input_delay: delays.clone(),
+        ..options.clone()
+    };
+    let mut shifted = fit_aligned(records, &options).ok()?;
+    let gain = shifted.dead_time.gain_over(&plain.dead_time)?;
+    if gain < NEEDED {
+        return None;
+    }
+    let said: Vec<String> = records
+        .inputs()
+        .iter()
+        .zip(delays)
+        .filter(|(_, delay)| **delay > 0)
+        .map(|(channel, delay)| format!("{} {delay} samples", channel.name))
+        .collect();
+    shifted.summary.explanation.insert(
+        0,
+        format!(
+            "dead time: {}; the coefficients of the vector ARX model are zero up to there (p > {LEVEL}), and with the input \
+             shifted order {} does what takes order {} without (Schwarz's criterion is smaller by {gain:.0}); --delay 0 \
+             leaves it out",
+            said.join(", "),
+            shifted.summary.order,
+            plain.summary.order,
+        ),
+    );
+    Some(shifted)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::identify::{Model, identify};
+    use crate::log::{Channel, Log};
+
+    /// `y` follows `u` with a pole at 0.9 after `dead` samples, under slow and white noise; with `gain` a controller closes the
+    /// loop.
+    fn recorded(dead: usize, samples: usize, gain: f64, seed: u64) -> Log {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let (mut u, mut y, mut x, mut slow, mut r) = (vec![], vec![], 0.0, 0.0, 0.0);
+        for k in 0..samples {
+            slow = 0.9 * slow + 0.1 * normal();
+            let measured: f64 = x + slow + 0.1 * normal();
+            if k % 8 == 0 {
+                r = normal();
+            }
+            u.push(r - gain * measured);
+            y.push(measured);
+            let late: f64 = if k >= dead { u[k - dead] } else { 0.0 };
+            x = 0.9 * x + 0.1 * late;
+        }
+        Log {
+            name: "dead time".to_owned(),
+            sample_time: 1.0,
+            start_time: 0.0,
+            inputs: vec![Channel::new("u")],
+            outputs: vec![Channel::new("y")],
+            input_data: vec![u],
+            output_data: vec![y],
+            sha256: None,
+        }
+    }
+
+    fn model(log: Log, input_delay: Vec<usize>) -> Model {
+        let options = Options {
+            input_delay,
+            ..Options::default()
+        };
+        identify(&[log], &options).unwrap()
+    }
+
+    #[test]
+    fn dead_time_is_found_and_costs_no_states() {
+        for (dead, gain) in [(3, 0.0), (8, 0.0), (8, 0.5), (20, 0.0)] {
+            let found: Vec<(usize, usize)> = (0..5)
+                .map(|seed| {
+                    let model = model(recorded(dead, 3000, gain, seed), Vec::new());
+                    (model.inputs[0].delay, model.system.states())
+                })
+                .collect();
+            let right = found.iter().filter(|(delay, _)| *delay == dead).count();
+            assert!(right >= 4, "{dead} {gain}: {found:?}");
+            assert!(found.iter().all(|(_, states)| *states <= 3), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_plant_without_dead_time_has_none() {
+        for seed in 0..10 {
+            let model = model(recorded(0, 3000, 0.0, seed), Vec::new());
+            assert_eq!(model.inputs[0].delay, 0, "{seed}");
+        }
+    }
+
+    #[test]
+    fn what_the_user_says_counts() {
+        assert_eq!(model(recorded(8, 2000, 0.0, 1), vec![0]).inputs[0].delay, 0);
+        assert_eq!(model(recorded(8, 2000, 0.0, 1), vec![5]).inputs[0].delay, 5);
+    }
+}
