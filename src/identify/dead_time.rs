@@ -16,6 +16,10 @@ use crate::linalg::{cholesky_upper, solve_upper_transposed};
 
 /// Significance of the leading coefficients from which a dead time has ended.
 const LEVEL: f64 = 0.01;
+/// Criteria that differ by less are as good: "not worth more than a bare mention" (ibidem).
+const AS_GOOD: f64 = 2.0;
+/// Samples less than proposed that are tried.
+const FEWER: usize = 2;
 /// By how much Schwarz's criterion must fall: "very strong" evidence (Kass and Raftery 1995).
 const NEEDED: f64 = 10.0;
 
@@ -105,30 +109,44 @@ impl Evidence {
 /// The model of inputs that are shifted by the dead time that `plain` proposes, where that is clearly better.
 pub(super) fn shifted(records: &mut dyn Records, options: &Options, plain: &Fit) -> Option<Fit> {
     let known = !options.input_delay.is_empty() || records.reduced().is_some();
-    let delays = &plain.dead_time.proposed;
-    if known || delays.iter().all(|d| *d == 0) {
+    let proposed = &plain.dead_time.proposed;
+    if known || proposed.iter().all(|d| *d == 0) {
         return None;
     }
-    let options = Options {
-        input_delay: delays.clone(),
-        ..options.clone()
-    };
-    let mut shifted = fit_aligned(records, &options).ok()?;
-    let gain = shifted.dead_time.gain_over(&plain.dead_time)?;
-    if gain < NEEDED {
-        return None;
+    // The first coefficients of a smooth response may be too small to be seen: fewer samples are tried as well, and the fewest
+    // that do as well are right more often than the most.
+    let mut tried: Vec<(f64, Fit)> = Vec::new();
+    for fewer in (0..=FEWER).rev() {
+        let input_delay: Vec<usize> = proposed.iter().map(|d| d.saturating_sub(fewer)).collect();
+        if input_delay.iter().all(|d| *d == 0) {
+            continue;
+        }
+        let options = Options {
+            input_delay,
+            ..options.clone()
+        };
+        let Ok(fit) = fit_aligned(records, &options) else {
+            continue;
+        };
+        if let Some(gain) = fit.dead_time.gain_over(&plain.dead_time) {
+            tried.push((gain, fit));
+        }
     }
+    let most = tried.iter().map(|t| t.0).reduce(f64::max)?;
+    let (gain, mut shifted) = tried
+        .into_iter()
+        .find(|(gain, _)| *gain >= NEEDED && *gain > most - AS_GOOD)?;
     let said: Vec<String> = records
         .inputs()
         .iter()
-        .zip(delays)
+        .zip(&shifted.delays)
         .filter(|(_, delay)| **delay > 0)
         .map(|(channel, delay)| format!("{} {delay} samples", channel.name))
         .collect();
     shifted.summary.explanation.insert(
         0,
         format!(
-            "dead time: {}; the coefficients of the vector ARX model are zero up to there (p > {LEVEL}), and with the input \
+            "dead time: {}; no coefficient of the vector ARX model is significant up to there (p > {LEVEL}), and with the input \
              shifted order {} does what takes order {} without (Schwarz's criterion is smaller by {gain:.0}); --delay 0 \
              leaves it out",
             said.join(", "),
