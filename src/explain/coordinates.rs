@@ -216,27 +216,58 @@ pub(crate) struct Derivatives {
     pub rate_feedthrough: Vec<Vec<f64>>,
     /// `C A_c^-1`, a row an output, where that exists.
     pub integral: Option<Vec<Vec<f64>>>,
-    /// `-h^2 exp(A_c h/2) A_c B_c` (`n x r`, a column an input): what the first moment of an input within a sample
-    /// interval adds to the state, beyond its mean.
-    pub moment: Vec<Vec<f64>>,
+}
+
+/// `A_c h` and `B_c h` of the continuous plant that `plant` is the zero-order-hold equivalent of; where there is none (a pole
+/// on the negative real axis), the increments.
+fn continuous(plant: &Plant) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (n, r) = (plant.states, plant.inputs);
+    let mut both = DMatrix::identity(n + r, n + r);
+    both.view_mut((0, 0), (n, n)).copy_from(&plant.a_matrix());
+    both.view_mut((0, n), (n, r)).copy_from(&plant.b_matrix());
+    let log =
+        crate::linalg::logarithm(&both).unwrap_or_else(|| &both - DMatrix::identity(n + r, n + r));
+    (
+        log.view((0, 0), (n, n)).into_owned(),
+        log.view((0, n), (n, r)).into_owned(),
+    )
+}
+
+/// What the [`Moments`](super::effects::Moments) of each input within a sample interval add to the state, beyond its mean: two
+/// columns an input.
+///
+/// The responses to the inputs `1`, `x` and `x^2/2` over the interval are blocks of the exponential of a plant behind a chain
+/// of integrators (Van Loan 1978); Legendre's polynomials have the squares `1/12` and `1/180`.
+pub(crate) fn moment_columns(plant: &Plant) -> Vec<[Vec<f64>; 2]> {
+    let (n, r) = (plant.states, plant.inputs);
+    let (a, b) = continuous(plant);
+    let mut chain = DMatrix::zeros(n + 3 * r, n + 3 * r);
+    chain.view_mut((0, 0), (n, n)).copy_from(&a);
+    chain.view_mut((0, n), (n, r)).copy_from(&b);
+    for j in 0..2 * r {
+        chain[(n + j, n + r + j)] = 1.0;
+    }
+    let response = crate::linalg::exponential(&chain);
+    let to = |power: usize, j: usize| response.view((0, n + power * r + j), (n, 1)).into_owned();
+    (0..r)
+        .map(|j| {
+            let (constant, ramp, parabola) = (to(0, j), to(1, j), to(2, j));
+            let first = (&ramp - &constant * 0.5) * 12.0;
+            let second = (parabola * 2.0 - ramp + constant / 6.0) * 180.0;
+            [first.as_slice().to_vec(), second.as_slice().to_vec()]
+        })
+        .collect()
 }
 
 impl Derivatives {
     /// Of the continuous plant that `plant` is the zero-order-hold equivalent of; where there is none (a pole on the
     /// negative real axis), of the increments.
     pub fn new(plant: &Plant) -> Self {
-        let (n, r, l) = (plant.states, plant.inputs, plant.outputs);
+        let l = plant.outputs;
         let h = plant.sample_time;
         let c = plant.c_matrix();
-        let mut both = DMatrix::identity(n + r, n + r);
-        both.view_mut((0, 0), (n, n)).copy_from(&plant.a_matrix());
-        both.view_mut((0, n), (n, r)).copy_from(&plant.b_matrix());
-        let log = crate::linalg::logarithm(&both).map_or_else(
-            || (&both - DMatrix::identity(n + r, n + r)) / h,
-            |log| log / h,
-        );
-        let a_c = log.view((0, 0), (n, n)).into_owned();
-        let b_c = log.view((0, n), (n, r)).into_owned();
+        let (a_c, b_c) = continuous(plant);
+        let (a_c, b_c) = (a_c / h, b_c / h);
         let rows = |m: DMatrix<f64>| -> Vec<Vec<f64>> {
             let flat = row_major(&m);
             (0..l)
@@ -250,12 +281,7 @@ impl Derivatives {
                 inverse.iter().all(|v| v.is_finite()) && inverse.norm() * a_c.norm() < 1e9
             })
             .map(|inverse| rows(&c * inverse));
-        let half = crate::linalg::exponential(&(&a_c * (0.5 * h)));
-        let moment = half * (&a_c * &b_c) * (-h * h);
         Self {
-            moment: (0..r)
-                .map(|j| moment.column(j).iter().copied().collect())
-                .collect(),
             rate: rows(&c * &a_c),
             rate_feedthrough: rows(&c * &b_c),
             integral,
@@ -330,9 +356,30 @@ mod tests {
             &found.integral.unwrap(),
             &c * a.clone().try_inverse().unwrap(),
         );
-        let half = crate::linalg::exponential(&(&a * (0.5 * plant.sample_time)));
-        let moment = half * &a * &b * -plant.sample_time.powi(2);
-        close(&found.moment, moment.transpose());
+    }
+
+    /// By summation over the interval.
+    #[test]
+    fn moments_move_the_state_as_the_continuous_plant_does() {
+        let (a, b, plant) = continuous();
+        let found = moment_columns(&plant);
+        const STEPS: usize = 4000;
+        let h = plant.sample_time / STEPS as f64;
+        for (j, columns) in found.iter().enumerate() {
+            let mut sums = [DVector::zeros(2), DVector::zeros(2)];
+            for i in 0..STEPS {
+                let x = (i as f64 + 0.5) / STEPS as f64;
+                let left = crate::linalg::exponential(&(&a * (plant.sample_time * (1.0 - x))));
+                let push = left * b.column(j) * h;
+                sums[0] += &push * (12.0 * (x - 0.5));
+                sums[1] += &push * (180.0 * (x * x - x + 1.0 / 6.0));
+            }
+            for (column, sum) in columns.iter().zip(&sums) {
+                for (found, wanted) in column.iter().zip(sum.iter()) {
+                    assert!((found - wanted).abs() < 1e-7, "{j}: {found} {wanted}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -88,7 +88,27 @@ pub(crate) const REFINEMENTS: &[Refinement] = &[
     },
     Refinement {
         simple: ("input_delay", ""),
+        rich: ("input_delay", "from rest"),
+        more: More::Nothing,
+    },
+    Refinement {
+        simple: ("actuator_lag", ""),
+        rich: ("actuator_lag", "from rest"),
+        more: More::Nothing,
+    },
+    Refinement {
+        simple: ("input_delay", ""),
         rich: ("input_delay", "interpolated"),
+        more: More::Nothing,
+    },
+    Refinement {
+        simple: ("input_delay", "from rest"),
+        rich: ("input_delay", "interpolated from rest"),
+        more: More::Nothing,
+    },
+    Refinement {
+        simple: ("actuator_lag", "from rest"),
+        rich: ("actuator_lag", "held from rest"),
         more: More::Nothing,
     },
     Refinement {

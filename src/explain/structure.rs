@@ -14,7 +14,7 @@ use std::sync::Arc;
 pub(crate) use self::added::{add_charge, add_mode, add_sine, with_moments};
 use super::coordinates::Coordinates;
 use super::data::{Data, Segment, Series};
-use super::effects::{Action, CHARGE_ORDERS, Clock, Definition, Needs};
+use super::effects::{Action, CHARGE_ORDERS, Clock, Definition, Moments, Needs};
 use super::finer::Finer;
 use super::functionals::{Functionals, dot, matched_sign};
 use super::plant::Plant;
@@ -458,7 +458,8 @@ impl Structure {
         }
     }
 
-    /// Inputs as the plant sees them, and their moments within the intervals where a law has any.
+    /// Inputs as the plant sees them, and their moments within the intervals (all first ones, then all second ones) where a law
+    /// has any.
     pub fn effective_inputs<'a>(
         &self,
         theta: &[f64],
@@ -466,11 +467,12 @@ impl Structure {
         clock: &Clock,
     ) -> (Cow<'a, Series>, Option<Series>) {
         let mut inputs = Cow::Borrowed(&segment.inputs);
-        let mut moments: Option<Series> = None;
+        let mut moments: Option<Vec<Vec<Moments>>> = None;
         for (index, effect) in self.effects.iter().enumerate() {
             if let Action::Input(law) = effect.definition.action {
                 let moments = moments.get_or_insert_with(|| {
-                    segment.inputs.iter().map(|u| vec![0.0; u.len()]).collect()
+                    let inputs = segment.inputs.iter();
+                    inputs.map(|u| vec![[0.0; 2]; u.len()]).collect()
                 });
                 law(
                     &self.shape(theta, index),
@@ -480,10 +482,15 @@ impl Structure {
                 );
             }
         }
-        (
-            inputs,
-            moments.filter(|m| m.iter().flatten().any(|v| *v != 0.0)),
-        )
+        let any = moments.filter(|m| m.iter().flatten().any(|m| *m != [0.0; 2]));
+        let series = any.map(|moments| {
+            let of = |degree: usize| {
+                let channels = moments.iter();
+                channels.map(move |m| m.iter().map(|m| m[degree]).collect::<Vec<f64>>())
+            };
+            of(0).chain(of(1)).collect()
+        });
+        (inputs, series)
     }
 
     fn simulate_segment(

@@ -119,25 +119,30 @@ impl Bench<'_> {
             .collect();
         let observed = self.observed(channel, Vec::new(), &[]);
         let b = self.plant.b_column(input);
-        let moment = super::coordinates::Derivatives::new(&self.plant)
-            .moment
-            .swap_remove(input);
+        let within = super::coordinates::moment_columns(&self.plant).swap_remove(input);
         (definition.starts)(&observed)
             .into_iter()
             .map(|shape| {
                 let mut drive = Vec::new();
-                let mut drive_moment = Vec::new();
+                let mut moments: Vec<Vec<effects::Moments>> = Vec::new();
                 for (index, s) in segments.iter().enumerate() {
                     let mut u = s.inputs[input].clone();
-                    let mut m = vec![0.0; u.len()];
+                    let mut m = vec![[0.0; 2]; u.len()];
                     law(&shape, &mut u, &mut m, &self.clock(index));
                     drive.push(u.iter().zip(&s.inputs[input]).map(|(a, b)| a - b).collect());
-                    drive_moment.push(m);
+                    moments.push(m);
                 }
                 let mut column = self.response(&b, &drive);
-                if drive_moment.iter().flatten().any(|v| *v != 0.0) {
-                    let within = self.response(&moment, &drive_moment);
-                    for (y, w) in column.iter_mut().flatten().zip(within.iter().flatten()) {
+                for (degree, push) in within.iter().enumerate() {
+                    let drive: Vec<Vec<f64>> = moments
+                        .iter()
+                        .map(|m| m.iter().map(|m| m[degree]).collect())
+                        .collect();
+                    if drive.iter().flatten().all(|v| *v == 0.0) {
+                        continue;
+                    }
+                    let response = self.response(push, &drive);
+                    for (y, w) in column.iter_mut().flatten().zip(response.iter().flatten()) {
                         *y += w;
                     }
                 }

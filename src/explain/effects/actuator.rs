@@ -1,9 +1,36 @@
 //! What happens between the command that was recorded and the plant.
 
-use super::{Action, Clock, Definition, Mimic, Observed, Parameter, Unit, level};
+use super::{
+    Action, Clock, Definition, InputLaw, Mimic, Moments, Observed, Parameter, Unit, level,
+};
 
 /// What tells a delay from a lag.
 const A_STEP: &str = "faster sampling and a step: after a delay nothing moves at first, after a lag it moves at once";
+
+const DELAY: &[Parameter] = &[Parameter::between("delay", Unit::Second, 0.0, 1e12)];
+const TIME_CONSTANT: &[Parameter] = &[Parameter::positive("time_constant", Unit::Second)];
+
+/// What happens to a command that is held over each interval: another reading of the law that acts between samples.
+const fn of_command(
+    (id, variant): (&'static str, &'static str),
+    name: &'static str,
+    equation: &'static str,
+    parameters: &'static [Parameter],
+    law: InputLaw,
+) -> Definition {
+    Definition {
+        id,
+        variant,
+        name,
+        equation,
+        parameters,
+        mimics: &[],
+        linear: &[],
+        persists: true,
+        action: Action::Input(law),
+        starts: |_| Vec::new(),
+    }
+}
 
 pub(super) static ENTRIES: &[Definition] = &[
     Definition {
@@ -185,7 +212,7 @@ pub(super) static ENTRIES: &[Definition] = &[
         variant: "",
         name: "delay of the input",
         equation: "u_eff(t) = u(t - delay)",
-        parameters: &[Parameter::between("delay", Unit::Second, 0.0, 1e12)],
+        parameters: DELAY,
         mimics: &[Mimic {
             effect: "actuator_lag",
             experiment: A_STEP,
@@ -204,7 +231,7 @@ pub(super) static ENTRIES: &[Definition] = &[
         variant: "from rest",
         name: "delay of the input",
         equation: "u_eff(t) = u(t - delay), zero before the recording",
-        parameters: &[Parameter::between("delay", Unit::Second, 0.0, 1e12)],
+        parameters: DELAY,
         mimics: &[Mimic {
             effect: "actuator_lag",
             experiment: A_STEP,
@@ -223,7 +250,7 @@ pub(super) static ENTRIES: &[Definition] = &[
         variant: "from rest",
         name: "lag of the actuator or of the sensor, which a linear plant does not tell apart,",
         equation: "tau du_eff/dt + u_eff = u, zero before the recording",
-        parameters: &[Parameter::positive("time_constant", Unit::Second)],
+        parameters: TIME_CONSTANT,
         mimics: &[Mimic {
             effect: "input_delay",
             experiment: A_STEP,
@@ -242,7 +269,7 @@ pub(super) static ENTRIES: &[Definition] = &[
         variant: "",
         name: "lag of the actuator or of the sensor, which a linear plant does not tell apart,",
         equation: "tau du_eff/dt + u_eff = u",
-        parameters: &[Parameter::positive("time_constant", Unit::Second)],
+        parameters: TIME_CONSTANT,
         mimics: &[Mimic {
             effect: "input_delay",
             experiment: A_STEP,
@@ -268,42 +295,41 @@ pub(super) static ENTRIES: &[Definition] = &[
         action: Action::Input(saturate_softly),
         starts: |_| Vec::new(),
     },
-    Definition {
-        id: "input_rate_limit",
-        variant: "held",
-        name: "rate limit of the command, held between samples",
-        equation: "|u_eff[k] - u_eff[k-1]| <= rate h",
-        parameters: &[Parameter::positive("rate", Unit::InputRate)],
-        mimics: &[],
-        linear: &[],
-        persists: true,
-        action: Action::Input(rate_limit_held),
-        starts: |_| Vec::new(),
-    },
-    Definition {
-        id: "input_delay",
-        variant: "interpolated",
-        name: "delay of the command, interpolated and held between samples",
-        equation: "u_eff[k] = (1 - f) u[k-d] + f u[k-d-1]",
-        parameters: &[Parameter::between("delay", Unit::Second, 0.0, 1e12)],
-        mimics: &[],
-        linear: &[],
-        persists: true,
-        action: Action::Input(delay_held),
-        starts: |_| Vec::new(),
-    },
-    Definition {
-        id: "actuator_lag",
-        variant: "held",
-        name: "lag of the command, held between samples",
-        equation: "u_eff[k+1] = u_eff[k] + (1 - exp(-h/tau)) (u[k+1] - u_eff[k])",
-        parameters: &[Parameter::positive("time_constant", Unit::Second)],
-        mimics: &[],
-        linear: &[],
-        persists: true,
-        action: Action::Input(lag_held),
-        starts: |_| Vec::new(),
-    },
+    of_command(
+        ("input_rate_limit", "held"),
+        "rate limit of the command, held between samples",
+        "|u_eff[k] - u_eff[k-1]| <= rate h",
+        &[Parameter::positive("rate", Unit::InputRate)],
+        rate_limit_held,
+    ),
+    of_command(
+        ("input_delay", "interpolated"),
+        "delay of the command, interpolated and held between samples",
+        "u_eff[k] = (1 - f) u[k-d] + f u[k-d-1]",
+        DELAY,
+        |p, u, _, clock| delay(p, u, &mut vec![[0.0; 2]; u.len()], clock),
+    ),
+    of_command(
+        ("input_delay", "interpolated from rest"),
+        "delay of the command, interpolated and held between samples",
+        "u_eff[k] = (1 - f) u[k-d] + f u[k-d-1], zero before the recording",
+        DELAY,
+        |p, u, _, clock| delay_from_rest(p, u, &mut vec![[0.0; 2]; u.len()], clock),
+    ),
+    of_command(
+        ("actuator_lag", "held"),
+        "lag of the command, held between samples",
+        "u_eff[k+1] = u_eff[k] + (1 - exp(-h/tau)) (u[k+1] - u_eff[k])",
+        TIME_CONSTANT,
+        |p, u, _, clock| lag_held(u.first().copied().unwrap_or(0.0), p, u, clock),
+    ),
+    of_command(
+        ("actuator_lag", "held from rest"),
+        "lag of the command, held between samples",
+        "u_eff[k+1] = u_eff[k] + (1 - exp(-h/tau)) (u[k+1] - u_eff[k]), zero before the recording",
+        TIME_CONSTANT,
+        |p, u, _, clock| lag_held(0.0, p, u, clock),
+    ),
 ];
 
 /// Sharpness of a knee: infinite is a corner (Rapp's model of amplifier saturation).
@@ -313,7 +339,7 @@ pub(super) const SHARPNESS: Parameter = Parameter {
     ..Parameter::positive("knee_sharpness", Unit::Ratio)
 };
 
-fn saturate_softly(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+fn saturate_softly(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
     for u in u {
         *u = soft(*u, p[0], p[1]);
     }
@@ -330,7 +356,7 @@ pub(super) fn soft(x: f64, limit: f64, sharpness: f64) -> f64 {
     }
 }
 
-fn rate_limit_held(p: &[f64], u: &mut [f64], _: &mut [f64], clock: &Clock) {
+fn rate_limit_held(p: &[f64], u: &mut [f64], _: &mut [Moments], clock: &Clock) {
     let most = p[0] * clock.step;
     let mut at = 0.0;
     for u in u {
@@ -339,63 +365,58 @@ fn rate_limit_held(p: &[f64], u: &mut [f64], _: &mut [f64], clock: &Clock) {
     }
 }
 
-fn delay_held(p: &[f64], u: &mut [f64], _: &mut [f64], clock: &Clock) {
-    let mut unused = vec![0.0; u.len()];
-    delay(p, u, &mut unused, clock);
-}
-
-fn lag_held(p: &[f64], u: &mut [f64], _: &mut [f64], clock: &Clock) {
+/// `at` is where the actuator was when the recording began.
+fn lag_held(mut at: f64, p: &[f64], u: &mut [f64], clock: &Clock) {
     let share = -(-clock.step / p[0]).exp_m1();
-    let mut at = u.first().copied().unwrap_or(0.0);
     for u in u {
         at += share * (*u - at);
         *u = at;
     }
 }
 
-fn saturate(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+fn saturate(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
     for u in u {
         *u = u.clamp(-p[0], p[0]);
     }
 }
 
-fn saturate_upper(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+fn saturate_upper(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
     for u in u {
         *u = u.min(p[0]);
     }
 }
 
-fn saturate_lower(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+fn saturate_lower(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
     for u in u {
         *u = u.max(p[0]);
     }
 }
 
-fn saturate_range(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+fn saturate_range(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
     for u in u {
         *u = u.max(p[0]).min(p[1]);
     }
 }
 
-fn dead_range(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+fn dead_range(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
     for u in u {
         *u -= u.max(p[0]).min(p[1]);
     }
 }
 
-fn curve(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+fn curve(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
     for u in u {
         *u += super::law::curve(p, *u);
     }
 }
 
-fn dead_zone(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+fn dead_zone(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
     for u in u {
         *u -= u.clamp(-p[0], p[0]);
     }
 }
 
-fn play(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+fn play(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
     // At rest in the middle of the gap when the recording begins.
     let mut held = 0.0;
     if let Some(first) = u.first() {
@@ -409,7 +430,7 @@ fn play(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
 
 /// Static and kinetic friction of a valve on a command (He, Wang, Pottmann and Qin 2007): what the command has moved adds up
 /// until it exceeds static friction; the valve then moves until kinetic friction holds it.
-fn stiction(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+fn stiction(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
     let (stick, rest) = (p[0], p[0] * (1.0 - p[1]));
     let mut held = u.first().copied().unwrap_or(0.0);
     for u in u {
@@ -422,76 +443,90 @@ fn stiction(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
 }
 
 /// A ramp over the share `ramp` of the interval, then constant.
-fn rate_limit(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+fn rate_limit(p: &[f64], u: &mut [f64], moments: &mut [Moments], clock: &Clock) {
     let most = p[0] * clock.step;
     let mut at = u.first().copied().unwrap_or(0.0);
-    for (u, moment) in u.iter_mut().zip(moment) {
+    for (u, moments) in u.iter_mut().zip(moments) {
         let wanted = *u - at;
         let moved = wanted.clamp(-most, most);
         let ramp = (moved.abs() / most).min(1.0);
         *u = at + moved * (1.0 - 0.5 * ramp);
-        *moment += moved * ramp * (0.25 - ramp / 6.0);
+        moments[0] += moved * ramp * (0.25 - ramp / 6.0);
+        moments[1] -= moved * ramp * (1.0 - ramp).powi(2) / 12.0;
         at += moved;
     }
 }
 
-fn asymmetry(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+fn asymmetry(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
     for u in u {
         *u += p[0] * u.abs();
     }
 }
 
 /// Between two samples the held command changes at the share of the interval that is delayed.
-fn delay(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+fn delay(p: &[f64], u: &mut [f64], moments: &mut [Moments], clock: &Clock) {
     let first = u.first().copied().unwrap_or(0.0);
-    delay_after(first, p, u, moment, clock);
+    delay_after(first, p, u, moments, clock);
 }
 
-fn delay_from_rest(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
-    delay_after(0.0, p, u, moment, clock);
+fn delay_from_rest(p: &[f64], u: &mut [f64], moments: &mut [Moments], clock: &Clock) {
+    delay_after(0.0, p, u, moments, clock);
 }
 
 /// `start` is what the input was before the recording.
-fn delay_after(start: f64, p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+fn delay_after(start: f64, p: &[f64], u: &mut [f64], moments: &mut [Moments], clock: &Clock) {
     let samples = (p[0] / clock.step).clamp(0.0, u.len() as f64);
     let whole = samples.floor() as usize;
     let share = samples - samples.floor();
     let before = u.to_vec();
     let at = |k: usize, back: usize| if k < back { start } else { before[k - back] };
-    for (k, (u, moment)) in u.iter_mut().zip(moment).enumerate() {
+    for (k, (u, moments)) in u.iter_mut().zip(moments).enumerate() {
         let (new, old) = (at(k, whole), at(k, whole + 1));
         *u = new + share * (old - new);
-        *moment += 0.5 * (new - old) * share * (1.0 - share);
+        moments[0] += 0.5 * (new - old) * share * (1.0 - share);
+        moments[1] -= (new - old) * share * (1.0 - share) * (1.0 - 2.0 * share) / 6.0;
     }
 }
 
 /// An exponential within each interval.
-fn lag(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+fn lag(p: &[f64], u: &mut [f64], moments: &mut [Moments], clock: &Clock) {
     let first = u.first().copied().unwrap_or(0.0);
-    lag_after(first, p, u, moment, clock);
+    lag_after(first, p, u, moments, clock);
 }
 
-fn lag_from_rest(p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
-    lag_after(0.0, p, u, moment, clock);
+fn lag_from_rest(p: &[f64], u: &mut [f64], moments: &mut [Moments], clock: &Clock) {
+    lag_after(0.0, p, u, moments, clock);
 }
+
+/// Share of an interval over a time constant below which series serve.
+const LITTLE_DECAY: f64 = 0.03;
 
 /// `start` is where the actuator was when the recording began.
-fn lag_after(start: f64, p: &[f64], u: &mut [f64], moment: &mut [f64], clock: &Clock) {
+fn lag_after(start: f64, p: &[f64], u: &mut [f64], moments: &mut [Moments], clock: &Clock) {
     let a = clock.step / p[0];
     let decay = (-a).exp();
     let mean_of_decay = -(-a).exp_m1() / a;
-    // `int_0^1 (x - 1/2) exp(-a x) dx`; the closed form cancels where little decays.
-    let moment_of_decay = if a < 1e-2 {
-        a * (-1.0 / 12.0 + a * (1.0 / 24.0 - a / 80.0))
+    // `int_0^1 (x - 1/2) exp(-a x) dx` and the same with `x^2 - x + 1/6`; the closed forms cancel where little decays.
+    let moments_of_decay = if a < LITTLE_DECAY {
+        [
+            a * (-1.0 / 12.0 + a * (1.0 / 24.0 + a * (-1.0 / 80.0 + a / 360.0))),
+            a * a * (1.0 / 360.0 + a * (-1.0 / 720.0 + a / 2520.0)),
+        ]
     } else {
-        (1.0 - (1.0 + a) * decay) / (a * a) - 0.5 * mean_of_decay
+        let first = (mean_of_decay - decay) / a;
+        let second = (2.0 * first - decay) / a;
+        [
+            first - 0.5 * mean_of_decay,
+            second - first + mean_of_decay / 6.0,
+        ]
     };
     let mut at = start;
-    for (u, moment) in u.iter_mut().zip(moment) {
+    for (u, moments) in u.iter_mut().zip(moments) {
         let gap = at - *u;
         at = *u + gap * decay;
         *u += gap * mean_of_decay;
-        *moment += gap * moment_of_decay;
+        moments[0] += gap * moments_of_decay[0];
+        moments[1] += gap * moments_of_decay[1];
     }
 }
 

@@ -1,6 +1,6 @@
 //! Parameters that change at some time.
 
-use super::{Action, Clock, Definition, Mimic, Motion, Needs, Parameter, Sense, Unit};
+use super::{Action, Clock, Definition, Mimic, Moments, Motion, Needs, Parameter, Sense, Unit};
 
 pub(super) static ENTRIES: &[Definition] = &[
     Definition {
@@ -53,7 +53,7 @@ pub(super) static ENTRIES: &[Definition] = &[
     },
 ];
 
-fn gain(p: &[f64], u: &mut [f64], _: &mut [f64], clock: &Clock) {
+fn gain(p: &[f64], u: &mut [f64], _: &mut [Moments], clock: &Clock) {
     for (k, u) in u.iter_mut().enumerate() {
         *u *= 1.0 + p[0] * clock.share_after(k, p[1]);
     }

@@ -4,7 +4,7 @@
 //! degenerates to one of them (a stop at the origin is a spring) would win by having fewer numbers than a whole new
 //! plant.
 
-use super::{Action, Clock, Definition, Needs, Parameter, Unit};
+use super::{Action, Clock, Definition, Moments, Needs, Parameter, Unit};
 
 pub(super) static ENTRIES: &[Definition] = &[
     Definition {
@@ -45,7 +45,7 @@ pub(super) static ENTRIES: &[Definition] = &[
     },
 ];
 
-fn gain(p: &[f64], u: &mut [f64], _: &mut [f64], _: &Clock) {
+fn gain(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
     for u in u {
         *u *= 1.0 + p[0];
     }

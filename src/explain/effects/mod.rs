@@ -146,10 +146,13 @@ pub enum Needs {
 
 /// A parameter vector's effect on one output channel, in place.
 pub(crate) type ChannelLaw = fn(parameters: &[f64], channel: &mut [f64], clock: &Clock);
-/// The same for an input: the mean over each sample interval, and its first moment about the middle in units of the
-/// interval, `int (s - h/2) u(s) ds / h^2`, for laws that do not hold their value over the interval.
+/// The same for an input: the mean over each sample interval, and its moments, for laws that do not hold their value over the
+/// interval.
 pub(crate) type InputLaw =
-    fn(parameters: &[f64], mean: &mut [f64], moment: &mut [f64], clock: &Clock);
+    fn(parameters: &[f64], mean: &mut [f64], moments: &mut [Moments], clock: &Clock);
+/// `int (x - 1/2) u dx` and `int (x^2 - x + 1/6) u dx` over an interval of length 1: what an input does within it, by Legendre's
+/// polynomials of the first and the second degree.
+pub(crate) type Moments = [f64; 2];
 /// Force of unit amplitude over one sample; the memory is the effect's own state.
 pub(crate) type ForceLaw = fn(parameters: &[f64], motion: &Motion, memory: &mut [f64; 3]) -> f64;
 /// Starting values of the shape parameters, from what the simulation says the channel does.

@@ -42,14 +42,21 @@ fn at(id: &str, variant: &str, parameters: &[f64], position: f64, rate: f64) -> 
     force(id, variant)(parameters, &still, &mut [0.0; 3])
 }
 
-/// Mean and first moment of an input after the law, in every interval.
-fn driven(id: &str, variant: &str, parameters: &[f64], input: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let (mut mean, mut moment) = (input.to_vec(), vec![0.0; input.len()]);
+/// Mean and moments of an input after the law, in every interval.
+type Driven = (Vec<f64>, Vec<Moments>);
+
+fn driven(id: &str, variant: &str, parameters: &[f64], input: &[f64]) -> Driven {
+    let (mut mean, mut moments) = (input.to_vec(), vec![[0.0; 2]; input.len()]);
     match find(id, variant).unwrap().action {
-        Action::Input(law) => law(parameters, &mut mean, &mut moment, &clock()),
+        Action::Input(law) => law(parameters, &mut mean, &mut moments, &clock()),
         _ => panic!("{id} is no law of an input"),
     }
-    (mean, moment)
+    (mean, moments)
+}
+
+/// Legendre's polynomials of the first two degrees.
+fn legendre(x: f64) -> Moments {
+    [x - 0.5, x * x - x + 1.0 / 6.0]
 }
 
 fn seen(id: &str, variant: &str, parameters: &[f64], output: &[f64]) -> Vec<f64> {
@@ -61,34 +68,37 @@ fn seen(id: &str, variant: &str, parameters: &[f64], output: &[f64]) -> Vec<f64>
     output
 }
 
-/// Of one that moves on in small steps, `next(value, command, step)`: the value's mean and first moment about the middle.
-fn integrated(input: &[f64], next: impl Fn(f64, f64, f64) -> f64) -> (Vec<f64>, Vec<f64>) {
+/// Of one that moves on in small steps, `next(value, command, step)`: the value's mean and moments.
+fn integrated(input: &[f64], next: impl Fn(f64, f64, f64) -> f64) -> Driven {
     const SMALL: usize = 20_000;
     let h = 1.0 / SMALL as f64;
     let mut value = input[0];
     input
         .iter()
         .map(|u| {
-            let (mut mean, mut moment) = (0.0, 0.0);
+            let (mut mean, mut moments) = (0.0, [0.0; 2]);
             for i in 0..SMALL {
                 let after = next(value, *u, h * STEP);
                 let middle = 0.5 * (value + after);
                 mean += h * middle;
-                moment += h * middle * ((i as f64 + 0.5) * h - 0.5);
+                let weights = legendre((i as f64 + 0.5) * h);
+                for (moment, weight) in moments.iter_mut().zip(weights) {
+                    *moment += h * middle * weight;
+                }
                 value = after;
             }
-            (mean, moment)
+            (mean, moments)
         })
         .unzip()
 }
 
 const COMMAND: [f64; 8] = [0.5, 0.5, 2.0, -1.0, -1.2, 0.4, 0.45, 3.0];
 
-fn same(found: &(Vec<f64>, Vec<f64>), wanted: &(Vec<f64>, Vec<f64>), within: f64) {
-    for (found, wanted) in [(&found.0, &wanted.0), (&found.1, &wanted.1)] {
-        for (found, wanted) in found.iter().zip(wanted) {
-            assert_abs_diff_eq!(*found, *wanted, epsilon = within);
-        }
+fn same(found: &Driven, wanted: &Driven, within: f64) {
+    let means = found.0.iter().zip(&wanted.0);
+    let moments = found.1.iter().flatten().zip(wanted.1.iter().flatten());
+    for (found, wanted) in means.chain(moments) {
+        assert_abs_diff_eq!(*found, *wanted, epsilon = within);
     }
 }
 
@@ -106,7 +116,7 @@ fn a_rate_limit_ramps_within_the_interval() {
         );
     }
     let (held, moment) = driven("input_rate_limit", "held", &[9.0], &[0.5, 2.0, -1.0]);
-    assert_eq!(moment, [0.0; 3]);
+    assert_eq!(moment, [[0.0; 2]; 3]);
     for (found, wanted) in held.iter().zip([0.5, 1.4, 0.5]) {
         assert_abs_diff_eq!(*found, wanted, epsilon = 1e-12);
     }
@@ -125,9 +135,11 @@ fn a_lag_is_an_exponential_within_the_interval() {
         );
     }
     // Where little decays the closed form gives way to a series: both agree where one takes over from the other.
-    let moment = |a: f64| driven("actuator_lag", "", &[STEP / a], &COMMAND).1[2] / a;
-    let (below, above) = (moment(0.999_999e-2), moment(1.000_001e-2));
-    assert_abs_diff_eq!(below / above, 1.0, epsilon = 1e-6);
+    let moments = |a: f64| driven("actuator_lag", "", &[STEP / a], &COMMAND).1[2];
+    let (below, above) = (moments(0.029_999_99), moments(0.030_000_01));
+    for (degree, (below, above)) in below.iter().zip(above).enumerate() {
+        assert_abs_diff_eq!(below / above, 1.0, epsilon = 1e-6 * (1 + 4 * degree) as f64);
+    }
 
     let (held, _) = driven("actuator_lag", "held", &[STEP], &[0.5, 2.0]);
     assert_abs_diff_eq!(held[0], 0.5);
@@ -143,16 +155,18 @@ fn a_delay_moves_the_command_by_parts_of_an_interval() {
     for delay in [0.0, 0.03, 0.1, 0.27, 0.999] {
         const SMALL: usize = 1000;
         let h = 1.0 / SMALL as f64;
-        let wanted: (Vec<f64>, Vec<f64>) = (0..COMMAND.len())
+        let wanted: Driven = (0..COMMAND.len())
             .map(|k| {
-                let (mut mean, mut moment) = (0.0, 0.0);
+                let (mut mean, mut moments) = (0.0, [0.0; 2]);
                 for i in 0..SMALL {
                     let share = (i as f64 + 0.5) * h;
                     let sample = (k as f64 + share - delay / STEP).floor().max(0.0);
                     mean += h * COMMAND[sample as usize];
-                    moment += h * COMMAND[sample as usize] * (share - 0.5);
+                    for (moment, weight) in moments.iter_mut().zip(legendre(share)) {
+                        *moment += h * COMMAND[sample as usize] * weight;
+                    }
                 }
-                (mean, moment)
+                (mean, moments)
             })
             .unzip();
         same(
@@ -162,7 +176,7 @@ fn a_delay_moves_the_command_by_parts_of_an_interval() {
         );
         let (held, moment) = driven("input_delay", "interpolated", &[delay], &COMMAND);
         same(&(held, wanted.1.clone()), &wanted, 2e-3);
-        assert_eq!(moment, [0.0; COMMAND.len()]);
+        assert_eq!(moment, [[0.0; 2]; COMMAND.len()]);
     }
 }
 
@@ -198,7 +212,7 @@ fn static_laws_of_an_input() {
         ("input_gain", "", &[0.1], [-3.3, -0.55, 0.0, 0.44, 2.2]),
     ] {
         let (found, moment) = driven(id, variant, parameters, &u);
-        assert_eq!(moment, [0.0; 5], "{id}");
+        assert_eq!(moment, [[0.0; 2]; 5], "{id}");
         for (found, wanted) in found.iter().zip(wanted) {
             assert_abs_diff_eq!(*found, wanted, epsilon = 1e-12);
         }

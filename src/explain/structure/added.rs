@@ -1,29 +1,26 @@
 //! What is added around the plant: inputs that effects need, and what effects add to the outputs themselves, which no
 //! state of the plant knows of.
 
-use crate::explain::coordinates::Derivatives;
+use crate::explain::coordinates::moment_columns;
 use crate::explain::data::Series;
 use crate::explain::effects::{CHARGE_ORDERS, Clock, charge};
 use crate::explain::plant::Plant;
 
-/// The plant with the first moments of its inputs as further inputs.
+/// The plant with the moments of its inputs as further inputs: all first ones, then all second ones.
 pub(crate) fn with_moments(plant: &Plant) -> Plant {
-    let moment = Derivatives::new(plant).moment;
+    let columns = moment_columns(plant);
     let (n, r, l) = (plant.states, plant.inputs, plant.outputs);
     let mut wider = plant.clone();
-    wider.inputs = 2 * r;
+    wider.inputs = 3 * r;
     wider.b = (0..n)
-        .flat_map(|i| (0..2 * r).map(move |j| (i, j)))
-        .map(|(i, j)| {
-            if j < r {
-                plant.b[i * r + j]
-            } else {
-                moment[j - r][i]
-            }
+        .flat_map(|i| (0..3 * r).map(move |j| (i, j)))
+        .map(|(i, j)| match j / r {
+            0 => plant.b[i * r + j],
+            degree => columns[j % r][degree - 1][i],
         })
         .collect();
     wider.d = (0..l)
-        .flat_map(|o| (0..2 * r).map(move |j| (o, j)))
+        .flat_map(|o| (0..3 * r).map(move |j| (o, j)))
         .map(|(o, j)| if j < r { plant.d[o * r + j] } else { 0.0 })
         .collect();
     wider

@@ -1,7 +1,7 @@
 use approx::assert_abs_diff_eq;
 
 use super::*;
-use crate::explain::coordinates::Derivatives;
+use crate::explain::coordinates::moment_columns;
 use crate::explain::effects;
 
 const N: usize = 60;
@@ -288,13 +288,18 @@ fn moments_are_what_moves_within_an_interval() {
 fn moments_do_not_pass_through() {
     let plant = coordinates().given.clone();
     let wider = with_moments(&plant);
-    assert_eq!((wider.inputs, wider.states), (4, 3));
-    let moment = Derivatives::new(&plant).moment;
-    for (i, row) in wider.b.chunks_exact(4).enumerate() {
+    assert_eq!((wider.inputs, wider.states), (6, 3));
+    let columns = moment_columns(&plant);
+    for (i, row) in wider.b.chunks_exact(6).enumerate() {
         assert_eq!(row[..2], plant.b[2 * i..2 * i + 2]);
-        assert_eq!(row[2..], [moment[0][i], moment[1][i]]);
+        for degree in 0..2 {
+            let of = |input: usize| columns[input][degree][i];
+            assert_eq!(row[2 + 2 * degree..4 + 2 * degree], [of(0), of(1)]);
+        }
     }
-    assert_eq!(wider.d, [0.01, 0.02, 0.0, 0.0, 0.03, 0.04, 0.0, 0.0]);
+    for (row, direct) in wider.d.chunks_exact(6).zip([[0.01, 0.02], [0.03, 0.04]]) {
+        assert_eq!((&row[..2], &row[2..]), (&direct[..], &[0.0; 4][..]));
+    }
 }
 
 /// A drift belongs to the recording it was found in; an offset stays.
