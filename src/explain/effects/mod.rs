@@ -6,6 +6,7 @@
 
 mod actuator;
 mod change;
+mod command;
 mod disturbance;
 mod flow;
 mod friction;
@@ -292,6 +293,7 @@ pub fn library() -> impl Iterator<Item = &'static Definition> {
         stiffness::ENTRIES,
         flow::ENTRIES,
         actuator::ENTRIES,
+        command::ENTRIES,
         sensor::ENTRIES,
         disturbance::ENTRIES,
         change::ENTRIES,
