@@ -39,7 +39,7 @@ def noise(r, kind, n, size):
         for k in range(n + 400):
             x = pole * x + math.sqrt(1 - pole * pole) * r.gauss(0, 1); v.append(x + e[k] * r.uniform(.9, 1.1))
     elif kind == "arma":
-        a1, a2, c = r.uniform(1.0, 1.7), -r.uniform(.3, .75), r.uniform(-.6, .6); v = [0.0, 0.0]
+        radius, angle, c = r.uniform(.5, .9), r.uniform(.1, 1.5), r.uniform(-.6, .6); a1, a2, v = 2 * radius * math.cos(angle), -radius * radius, [0.0, 0.0]
         for k in range(2, n + 400): v.append(a1 * v[-1] + a2 * v[-2] + e[k] + c * e[k - 1])
     elif kind == "1/f":
         rows = [[0.0, 1 - 4.0 ** -i] for i in range(1, 7)]; v = []

@@ -260,7 +260,7 @@ fn lag_after(start: f64, p: &[f64], u: &mut [f64], moments: &mut [Moments], cloc
     }
 }
 
-fn rates(seen: &Observed) -> Vec<Vec<f64>> {
+pub(super) fn rates(seen: &Observed) -> Vec<Vec<f64>> {
     let changes: Vec<f64> = seen
         .channel
         .windows(2)

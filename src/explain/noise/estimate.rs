@@ -29,8 +29,14 @@ const SLOW: [(f64, f64); 6] = [
 ];
 /// Order of the autoregression whose errors stand for the innovations in the starts.
 const LONG: usize = 20;
-/// Gaps up to this length are bridged by a straight line where the colour is estimated; longer ones are left empty.
+/// Gaps up to this length are bridged by a straight line between their neighbours where the colour is estimated; longer ones
+/// by a line between the means of so many values on either side: zeros would be jumps of slow noise, and the neighbours alone
+/// would make slow noise of white noise.
 const SHORT_GAP: usize = 8;
+const SIDE_OF_A_LONG_GAP: usize = 20;
+/// Share of a stretch over which the periodogram is tapered at either end: the jump from the end to the beginning of slow noise
+/// would leak into all frequencies (Dahlhaus 1988).
+const TAPER: f64 = 0.05;
 /// Lowest frequencies that make a bin each, and the growth of the bins above.
 const SINGLE_BINS: usize = 16;
 const BIN_GROWTH: f64 = 1.04;
@@ -171,7 +177,7 @@ pub(super) fn colour(
     best.1
 }
 
-/// A stretch less the mean; what does not count is bridged where short, else zero.
+/// A stretch less the mean; what does not count is bridged.
 fn bridged(v: &[f64], mask: &[bool], mean: f64) -> Vec<f64> {
     let mut out: Vec<f64> = v
         .iter()
@@ -188,15 +194,36 @@ fn bridged(v: &[f64], mask: &[bool], mean: f64) -> Vec<f64> {
         while k < out.len() && !mask[k] {
             k += 1;
         }
-        if from > 0 && k < out.len() && k - from <= SHORT_GAP {
-            let (a, b) = (out[from - 1], out[k]);
-            let length = (k - from + 1) as f64;
-            for (i, value) in out[from..k].iter_mut().enumerate() {
-                *value = a + (b - a) * (i + 1) as f64 / length;
-            }
+        let side = if k - from <= SHORT_GAP {
+            1
+        } else {
+            SIDE_OF_A_LONG_GAP
+        };
+        let level = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+        // What was bridged before counts as well; what comes after, as far as it counts.
+        let a = level(&out[from.saturating_sub(side)..from]);
+        let after = mask[k..]
+            .iter()
+            .take(side)
+            .take_while(|keep| **keep)
+            .count();
+        let b = level(&out[k..k + after]);
+        let length = (k - from + 1) as f64;
+        for (i, value) in out[from..k].iter_mut().enumerate() {
+            *value = a + (b - a) * (i + 1) as f64 / length;
         }
     }
     out
+}
+
+/// Tukey's window at sample `k` of `n`.
+fn taper(k: usize, n: usize) -> f64 {
+    let edge = (k.min(n - 1 - k) as f64 + 0.5) / (TAPER * n as f64);
+    if edge >= 1.0 {
+        1.0
+    } else {
+        0.5 - 0.5 * (std::f64::consts::PI * edge).cos()
+    }
 }
 
 /// Sums of lagged products.
@@ -420,7 +447,13 @@ impl Bins {
         for v in filled.iter().filter(|v| v.len() >= 16) {
             let n = v.len();
             let transform = planner.plan_fft_forward(n);
-            let mut input = v.clone();
+            let mut input = Vec::with_capacity(n);
+            let mut squares = 0.0;
+            for (k, v) in v.iter().enumerate() {
+                let weight = taper(k, n);
+                squares += weight * weight;
+                input.push(weight * v);
+            }
             let mut spectrum = transform.make_output_vec();
             transform.process(&mut input, &mut spectrum).ok()?;
             let mut bin = 0;
@@ -432,7 +465,7 @@ impl Bins {
                 // The last ordinate of an even number is one value, not two.
                 let weight = if 2 * j == n { 0.5 } else { 1.0 };
                 counts[bin] += weight;
-                powers[bin] += weight * s.norm_sqr() * share / n as f64;
+                powers[bin] += weight * s.norm_sqr() * share / squares;
                 places[bin] += weight * place;
             }
         }

@@ -24,6 +24,7 @@ fn a_linear_plant_is_better_left_linear() {
         let fit = fit(
             &[(&u, &noisy(&y, 0.1, 50 + seed as u64))],
             &[vec![true; 1000]],
+            f64::INFINITY,
         );
         assert!(fit.is_none_or(|f| f.losses.outflow < -20.0), "{poles:?}");
     }

@@ -34,7 +34,7 @@ fn levels_to_start_from_lie_within_what_was_seen() {
     // Rates a second, up to the fastest.
     let ramp: Vec<f64> = (0..100).map(|k| 0.02 * f64::from(k * k)).collect();
     let fastest = 0.02 * f64::from(99 * 99 - 98 * 98) / 0.5;
-    let found = rates(&seen(ramp));
+    let found = super::super::command::rates(&seen(ramp));
     assert!(found.len() > 4);
     assert!(
         found
@@ -43,5 +43,5 @@ fn levels_to_start_from_lie_within_what_was_seen() {
         "{found:?}"
     );
     assert!(found.iter().any(|r| r[0] > 0.9 * fastest));
-    assert!(rates(&seen(vec![1.0; 9])).is_empty());
+    assert!(super::super::command::rates(&seen(vec![1.0; 9])).is_empty());
 }
