@@ -30,6 +30,10 @@ const CURVE_HANDICAP: f64 = 0.04;
 /// What an answer owes that physics allows but that is rare, such as a hysteresis that gives energy back: odds of 1
 /// to 400.
 const UNUSUAL: f64 = 12.0;
+/// What each number of a trend or of an integral owes beyond Schwarz's criterion: slow noise makes such columns fit by chance
+/// (Phillips 1986). With a pole at one the squared statistic of a trend has its 1 % point at 15.7 (Dickey and Fuller 1979), not
+/// at 6.6.
+const TREND: f64 = 15.7 - 6.6;
 /// Evidence from which held-out blocks are not asked: they could not say otherwise.
 const BEYOND_DOUBT: f64 = 100.0;
 /// With a larger probability what is left is called noise, and no second effect is looked for.
@@ -217,7 +221,8 @@ pub(crate) fn inquire(
         &finding.boring.given,
         None,
     );
-    if linear.is_none_or(|a| a.p_value < NOTHING_LEFT) {
+    let found = ranked.iter().any(|r| base - r.criterion > NEEDED);
+    if found || linear.is_none_or(|a| a.p_value < NOTHING_LEFT) {
         let others: Vec<&Fit> = ranked
             .iter()
             .map(|r| &r.fit)
@@ -434,6 +439,13 @@ fn owed(ranked: &Ranked, index: usize, base: f64, count: usize) -> f64 {
         // A curve without a form follows any law; the law is the simpler answer.
         "law" | "input_curve" => CURVE_LEAD.max(CURVE_HANDICAP * gain),
         "valve_stiction" => LAW_IMPERFECTION * gain,
+        "sensor_drift" | "state_of_charge" => {
+            let structure = &ranked.fit.structure;
+            let effect = &structure.effects[index];
+            let held = definition.parameters.iter().filter(|p| p.held).count();
+            let numbers = effect.len(structure.states(), structure.outputs()) - held;
+            TREND * numbers as f64
+        }
         _ => 0.0,
     };
     owed

@@ -10,7 +10,6 @@ use super::functionals::Functionals;
 use super::noise::Noise;
 use super::screen::{Lead, extended, screen};
 use super::structure::{Direction, Instance, Signal, Structure};
-use super::templates::CHANGE_TIMES;
 
 /// Effects that are fitted in full from each screening.
 const LEADS_EACH: usize = 6;
@@ -439,7 +438,7 @@ fn scan(problem: &Problem, fit: &Fit, at: usize) -> Option<Vec<f64>> {
     let length = problem.data.segments[0].samples() as f64 * problem.data.sample_time;
     let mut best = fit.theta.clone();
     let mut least = fit.deviance;
-    let mut width = length / CHANGE_TIMES as f64;
+    let mut width = length / 20.0;
     while width > 0.5 * problem.data.sample_time {
         let centre = best[at];
         for i in [-3, -2, -1, 1, 2, 3] {

@@ -25,7 +25,7 @@ const DIFFERENCE: f64 = 1e-5;
 
 /// Tanks that leave a larger mean square error than so many times another explanation's are not pursued: noise with colour
 /// makes up for less.
-const MOST_ERROR: f64 = 1.2;
+const MOST_ERROR: f64 = 2.0;
 
 /// Share of the samples in which a pump with a bias may stand still.
 const MOST_IDLE: f64 = 0.1;

@@ -8,7 +8,7 @@ use super::screen::{Bench, Signals, Template};
 use super::structure::{Direction, Instance, Signal, add_charge, add_mode, add_sine};
 
 /// Times of change that are tried over a recording.
-pub(crate) const CHANGE_TIMES: usize = 40;
+const CHANGE_TIMES: usize = 40;
 
 /// Frequencies at which a missing resonance is tried.
 const MODE_FREQUENCIES: usize = 40;

@@ -278,7 +278,7 @@ pub fn finish(
         first_trend: data.trend(0).clone(),
         dead_time: Evidence::new(
             &varx,
-            chosen_evidence(&summary).and_then(|e| e.schwarz),
+            chosen_evidence(&summary),
             factor.inputs,
             &data.scale[factor.inputs..],
         ),

@@ -238,6 +238,7 @@ fn kalman<const N: usize>(ar: &[f64], ma: &[f64]) -> Option<Vec<Start<[f64; MOST
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{DMatrix, DVector};
 
     /// Autocovariance from the impulse response, whose squares and products are summed until nothing is left of them.
     fn autocovariance(ar: &[f64], ma: &[f64], lags: usize) -> Vec<f64> {
