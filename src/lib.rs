@@ -73,6 +73,7 @@ pub mod linalg;
 pub mod log;
 pub mod model;
 pub mod moments;
+mod noise;
 pub mod report;
 pub mod reproduce;
 pub mod systems;

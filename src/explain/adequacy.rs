@@ -11,9 +11,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::data::{Series, difference};
 use super::fit::{Fit, Problem};
-use super::noise::{Colours, Mask, Noise};
 use super::screen::Bench;
 use super::structure::Instance;
+use crate::noise::{Colours, Mask, Noise};
 
 /// Significance at which what is left counts as structure.
 pub(crate) const LEVEL: f64 = 1e-4;

@@ -12,13 +12,13 @@ use super::explanation::{
 use super::fit::{Fit, Problem};
 use super::inquiry::{Finding, NEEDED};
 use super::locate;
-use super::noise::Mask;
 use super::probability::probability;
 use super::prove;
 use super::simulation::Known;
 use super::words;
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
+use crate::noise::Mask;
 
 /// Points of a trace in the document, at most.
 const TRACE_POINTS: usize = 1500;

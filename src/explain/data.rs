@@ -31,8 +31,7 @@ pub(crate) struct Data {
     pub constant: bool,
 }
 
-/// A column a segment and output (`segment * outputs + output`): residuals, simulated outputs, weights.
-pub(crate) type Series = Vec<Vec<f64>>;
+pub(crate) use crate::noise::Series;
 
 /// `a - b`.
 pub(crate) fn difference(a: &Series, b: &Series) -> Series {

@@ -14,8 +14,8 @@ use nalgebra::DVector;
 
 use self::gauss_newton::Jacobian;
 use super::data::{Data, Series};
-use super::noise::{Colours, Mask, Noise, sum_of_squares};
 use super::structure::Structure;
+use crate::noise::{Colours, Mask, Noise, sum_of_squares};
 
 /// How hard a fit tries.
 #[derive(Debug, Clone, Copy)]

@@ -6,13 +6,13 @@ use super::data::{Data, difference};
 use super::effects::{self, Definition, Unit};
 use super::explanation::Verdict;
 use super::fit::{Effort, Fit, Problem};
-use super::noise::Mask;
 use super::plausible::{add_free_twins, plant_may_stay, pulls, reaches, sane};
 use super::refine::{FURTHER, REFINEMENTS, decides_within, derived, finer_steps};
 use super::search::{Boring, Ranked, single_effects};
 use super::second::{self, pair, validated_gain, with_feedthrough};
 use super::simulation::Known;
 use super::structure::Structure;
+use crate::noise::Mask;
 
 /// Places, laws and starting values that are tried on one recording, about: a name among so many needs
 /// `2 ln(300)` more than nothing at all (the maximum of that many chi-squares with one degree of freedom).

@@ -6,7 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use super::data::{Data, Series};
 use super::effects;
 use super::explanation::Regime;
-use super::noise::{Mask, Noise};
+use crate::noise::{Mask, Noise};
 
 /// Family-wise level of every map.
 const LEVEL: f64 = 1e-3;

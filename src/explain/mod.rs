@@ -48,7 +48,6 @@ mod functionals;
 mod inquiry;
 mod locate;
 mod memory;
-mod noise;
 mod offset;
 mod plant;
 mod plausible;

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::data::{Data, Series};
 use super::explanation::{FitFigure, FitSteps};
 use super::fit::{Effort, Fit, Problem};
-use super::noise::Mask;
+use crate::noise::Mask;
 
 /// Blocks that are set aside, spread over each recording, and the share of it that they make up: enough for the figures of
 /// the proof, and little enough to miss.

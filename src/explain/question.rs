@@ -9,10 +9,10 @@ use super::error::ExplainError;
 use super::explanation::{Explanation, Verdict};
 use super::inquiry::{Finding, inquire};
 use super::memory;
-use super::noise::Mask;
 use super::simulation::{Simulation, know};
 use super::weak;
 use crate::log::Log;
+use crate::noise::Mask;
 
 /// What can be asked for.
 #[derive(Debug, Clone, Default)]

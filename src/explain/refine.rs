@@ -166,7 +166,7 @@ pub(crate) fn derived(
         return Vec::new();
     };
     let reach = least + (IN_THE_RUNNING * (base - least)).max(NEEDED);
-    let mut jobs: Vec<(Structure, Vec<f64>, super::noise::Noise)> = Vec::new();
+    let mut jobs: Vec<(Structure, Vec<f64>, crate::noise::Noise)> = Vec::new();
     for refinement in refinements {
         let (Some(simple), Some(rich)) = (
             effects::find(refinement.simple.0, refinement.simple.1),

@@ -11,11 +11,11 @@ use super::data::{Data, Series};
 use super::effects::{self, Action, Clock, Definition, Sense};
 use super::fit::{Fit, Problem};
 use super::functionals::{Functionals, dot, matched_sign};
-use super::noise::Noise;
 use super::plant::Plant;
 use super::run::{Grid, run};
 use super::structure::{Direction, Instance, Signal, Structure};
 use crate::linalg::multiply_tn;
+use crate::noise::Noise;
 
 /// Lines of the residual's spectrum that are tried as a disturbance.
 const LINES: usize = 4;
@@ -461,8 +461,8 @@ fn clock(data: &Data, segment: usize) -> Clock {
 mod tests {
     use super::*;
     use crate::explain::fixtures::{effect, recorded, spring};
-    use crate::explain::noise::Colours;
     use crate::explain::structure::Structure;
+    use crate::noise::Colours;
 
     /// The lead of an effect at the place where it acts, beside the plant as it is.
     fn lead(truth: &Structure, theta: &[f64], direction: Direction) -> (Lead, f64) {

@@ -7,9 +7,9 @@ use rayon::prelude::*;
 use super::effects::{self, Definition, Unit};
 use super::fit::{Effort, Fit, Problem};
 use super::functionals::Functionals;
-use super::noise::Noise;
 use super::screen::{Lead, extended, screen};
 use super::structure::{Direction, Instance, Signal, Structure};
+use crate::noise::Noise;
 
 /// Effects that are fitted in full from each screening.
 const LEADS_EACH: usize = 6;

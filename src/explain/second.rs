@@ -6,10 +6,10 @@ use super::data::Series;
 use super::effects::Definition;
 use super::fit::{Effort, Fit, Problem};
 use super::inquiry::{penalty, polished};
-use super::noise::{Colours, Noise};
 use super::plausible::sane;
 use super::refine::{REFINEMENTS, derived};
 use super::search::{Ranked, second_effects};
+use crate::noise::{Colours, Noise};
 
 /// A second effect must bring this share of what the first brought: misfit of the first breeds false seconds
 /// (math/explain.md, choice 9).

@@ -9,12 +9,12 @@ use super::baseline::{Autoregression, Simulator, initial_states, of_order};
 use super::data::Data;
 use super::effects;
 use super::fit::{Effort, Fit, Problem};
-use super::noise::Colours;
 use super::plant::Plant;
 use super::rebaseline::companion;
 use super::simulation::bare;
 use super::structure::{Direction, Instance, Signal, Structure};
 use crate::linalg::least_squares;
+use crate::noise::Colours;
 
 /// Highest order that is tried.
 const MOST_ORDER: usize = 8;

@@ -9,7 +9,6 @@ use super::data::{Data, Segment, Series};
 use super::effects::{Action, Definition};
 use super::error::ExplainError;
 use super::fit::{Effort, Fit, Problem};
-use super::noise::Colours;
 use super::offset::operating_point;
 use super::plant::Plant;
 use super::run::MOST_STATES;
@@ -20,6 +19,7 @@ use super::uncertainty::Uncertainty;
 use crate::identify::Model;
 use crate::linalg::spectral_radius;
 use crate::log::{Channel, LARGEST_SIZE, Log};
+use crate::noise::Colours;
 
 /// What stands for the simulation.
 #[derive(Debug, Clone)]

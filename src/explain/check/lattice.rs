@@ -1,8 +1,8 @@
 //! A sensor of coarse resolution.
 
 use crate::explain::data::{Data, Series};
-use crate::explain::noise::Mask;
 use crate::log::spacing;
+use crate::noise::Mask;
 
 /// Share of the innovation variance that rounding to levels must make up to be named.
 pub(crate) const COARSE: f64 = 0.25;

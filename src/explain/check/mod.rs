@@ -32,9 +32,9 @@ pub(crate) use relation::between;
 
 use super::baseline::identify_simulator;
 use super::data::{Data, Segment};
-use super::noise::Mask;
 use super::simulation::Simulation;
 use crate::log::Log;
+use crate::noise::Mask;
 use relation::Pairs;
 
 /// Recordings and simulation as they are compared, and what was wrong with them.

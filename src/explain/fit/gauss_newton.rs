@@ -4,8 +4,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::Problem;
 use crate::explain::data::{Series, difference};
-use crate::explain::noise::Noise;
 use crate::linalg::multiply_tn;
+use crate::noise::Noise;
 
 /// Added to a curvature of one: numbers that do the same are held to the smallest change that does it.
 const RIDGE: f64 = 1e-12;

@@ -7,7 +7,6 @@ use super::super::effects::Definition;
 use super::super::explanation::Verdict;
 use super::super::fit::{Fit, Problem};
 use super::super::inquiry::{Finding, NEEDED, Rival};
-use super::super::noise::Mask;
 use super::super::plant::Plant;
 use super::super::prove;
 use super::super::search::Boring;
@@ -21,6 +20,7 @@ use super::regression::Regression;
 use super::tether::{Tethered, tether};
 use super::windows::{Reading, Windows};
 use crate::log::Log;
+use crate::noise::Mask;
 
 /// Fewer samples than this hold too few windows.
 const LEAST_SAMPLES: usize = 2000;

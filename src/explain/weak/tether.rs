@@ -8,10 +8,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::super::data::{Data, Series};
-use super::super::noise::Mask;
 use super::model::Equation;
 use super::regression::effective;
 use super::windows::Reading;
+use crate::noise::Mask;
 
 /// Rounds in which the weight of the free run is taken anew, and steps of each.
 const ROUNDS: usize = 3;

@@ -11,7 +11,6 @@ use statrs::function::gamma::ln_gamma;
 
 pub(crate) use self::colour::Colour;
 pub(crate) use self::estimate::Colours;
-use super::data::Series;
 
 /// Degrees of freedom that are tried; infinity is Gaussian.
 const DEGREES: [f64; 6] = [3.0, 4.0, 6.0, 10.0, 20.0, f64::INFINITY];
@@ -26,6 +25,9 @@ pub(crate) struct Noise {
     /// Degrees of freedom of Student's t; infinite for Gaussian.
     pub degrees: f64,
 }
+
+/// A column a recording and output (`recording * outputs + output`): residuals, simulated outputs, weights.
+pub(crate) type Series = Vec<Vec<f64>>;
 
 /// Which samples count: `false` is left out of every sum.
 pub(crate) type Mask = Vec<Vec<bool>>;

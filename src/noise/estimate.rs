@@ -13,7 +13,7 @@ use realfft::RealFftPlanner;
 
 use super::colour::{Colour, MOST_MIXED, MOST_ORDER};
 use super::{Mask, product};
-use crate::explain::data::Series;
+use crate::noise::Series;
 
 /// Mixed models that are tried, `(autoregressive order, moving average order)`: slow and white noise is the first; the
 /// next are what a process of second order leaves beside white noise, alone or with a slow one.
