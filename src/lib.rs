@@ -74,6 +74,7 @@ pub mod log;
 pub mod model;
 pub mod moments;
 mod noise;
+pub mod physics;
 pub mod report;
 pub mod reproduce;
 pub mod systems;

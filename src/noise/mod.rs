@@ -33,13 +33,18 @@ pub(crate) type Series = Vec<Vec<f64>>;
 pub(crate) type Mask = Vec<Vec<bool>>;
 
 impl Noise {
-    /// White and Gaussian, of the residual's size.
-    pub fn white(residual: &Series, outputs: usize, mask: &Mask) -> Self {
-        let mut noise = Self {
+    /// White and Gaussian, of size 1.
+    pub fn unit(outputs: usize) -> Self {
+        Self {
             colours: vec![Colour::default(); outputs],
             scale: vec![1.0; outputs],
             degrees: f64::INFINITY,
-        };
+        }
+    }
+
+    /// White and Gaussian, of the residual's size.
+    pub fn white(residual: &Series, outputs: usize, mask: &Mask) -> Self {
+        let mut noise = Self::unit(outputs);
         let squares = noise.squares(residual, mask);
         noise.fit_scale(&squares);
         noise

@@ -1,0 +1,286 @@
+//! The deviance of the recordings in one form, with its derivatives.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Form;
+use super::optimise::{Objective, RIDGE};
+use super::problem::Problem;
+use crate::noise::{Colour, Noise, Series};
+use crate::physics::simulate::{Direction, Observer, Plan, Trajectory};
+
+/// Runs of all recordings at a point.
+#[derive(Clone)]
+struct Runs {
+    at: Vec<f64>,
+    plans: Vec<Plan>,
+    residual: Series,
+}
+
+/// The deviance in one form with a given noise model.
+pub(super) struct Deviance<'p, 'a> {
+    problem: &'p Problem<'a>,
+    form: Form,
+    pub noise: Noise,
+    last: Option<Runs>,
+    accepted: Option<Runs>,
+}
+
+impl<'p, 'a> Deviance<'p, 'a> {
+    pub fn new(problem: &'p Problem<'a>, form: Form, noise: Noise) -> Self {
+        Self {
+            problem,
+            form,
+            noise,
+            last: None,
+            accepted: None,
+        }
+    }
+
+    fn gain(&self, point: &[f64]) -> Option<DMatrix<f64>> {
+        (self.form == Form::Innovation).then(|| self.problem.gain(point))
+    }
+
+    fn runs(&self, point: &[f64]) -> Option<Vec<Trajectory>> {
+        let gain = self.gain(point);
+        let problem = self.problem;
+        let points = problem.points(point);
+        problem
+            .recordings
+            .iter()
+            .zip(points)
+            .zip(&problem.plans)
+            .map(|((r, p), plan)| {
+                let columns = r.columns();
+                let observer = gain.as_ref().map(|gain| Observer {
+                    gain,
+                    recorded: &columns.outputs,
+                });
+                let excitation = problem.excitation(r, &columns);
+                problem
+                    .plant
+                    .simulate_as(&p, &excitation, observer.as_ref(), plan)
+                    .ok()
+            })
+            .collect()
+    }
+
+    fn run(&self, point: &[f64]) -> Option<Runs> {
+        let trajectories = self.runs(point)?;
+        let mut residual = Series::new();
+        for (r, t) in self.problem.recordings.iter().zip(&trajectories) {
+            for (y, s) in r.outputs.iter().zip(&t.outputs) {
+                residual.push(
+                    y.iter()
+                        .zip(s)
+                        .map(|(y, s)| if y.is_finite() { y - s } else { 0.0 })
+                        .collect(),
+                );
+            }
+        }
+        let plans = trajectories.into_iter().map(|t| t.plan).collect();
+        Some(Runs {
+            at: point.to_vec(),
+            plans,
+            residual,
+        })
+    }
+
+    /// Outputs at a point.
+    pub fn simulated(&self, point: &[f64]) -> Option<Series> {
+        Some(
+            self.runs(point)?
+                .into_iter()
+                .flat_map(|t| t.outputs)
+                .collect(),
+        )
+    }
+
+    /// Recording minus prediction.
+    pub fn residual(&self, point: &[f64]) -> Option<Series> {
+        self.run(point).map(|r| r.residual)
+    }
+
+    /// White noise of the size of the residual at a point.
+    pub fn rescale(&self, point: &[f64]) -> Option<Noise> {
+        Some(Noise::white(
+            &self.residual(point)?,
+            self.problem.outputs(),
+            &self.problem.mask,
+        ))
+    }
+
+    fn at(&mut self, point: &[f64]) -> Option<Runs> {
+        for known in [&self.last, &self.accepted].into_iter().flatten() {
+            if known.at == point {
+                return Some(known.clone());
+            }
+        }
+        self.run(point)
+    }
+
+    /// Whitened derivatives of the predictions: a column for each free number.
+    fn jacobian(&self, runs: &Runs) -> Option<DMatrix<f64>> {
+        let problem = self.problem;
+        let gain = self.gain(&runs.at);
+        let (n, l) = (problem.states(), problem.outputs());
+        let parameters = problem.free.iter().map(|&i| Direction::Parameter(i));
+        let starts = problem.starts.iter().map(|&i| Direction::Start(i));
+        let mut directions: Vec<Direction> = parameters.chain(starts).collect();
+        if gain.is_some() {
+            directions.extend((0..n).flat_map(|i| (0..l).map(move |j| Direction::Gain(i, j))));
+        }
+        let (p, s, count) = (
+            problem.free.len(),
+            problem.starts.len(),
+            problem.recordings.len(),
+        );
+        let rows = problem.count();
+        let mut matrix = DMatrix::zeros(rows, runs.at.len());
+        let mut row = 0;
+        for (r, (recording, point)) in problem
+            .recordings
+            .iter()
+            .zip(problem.points(&runs.at))
+            .enumerate()
+        {
+            let columns = recording.columns();
+            let observer = gain.as_ref().map(|gain| Observer {
+                gain,
+                recorded: &columns.outputs,
+            });
+            let excitation = problem.excitation(recording, &columns);
+            let slopes = problem.plant.sensitivities(
+                &point,
+                &excitation,
+                observer.as_ref(),
+                &runs.plans[r],
+                &directions,
+            );
+            let mask = &problem.mask[r * l..(r + 1) * l];
+            let mut height = 0;
+            for d in 0..directions.len() {
+                let series: Series = (0..l).map(|o| slopes[o][d].clone()).collect();
+                let whitened = self.noise.whiten_kept(&series, &mask.to_vec());
+                height = whitened.len();
+                let column = if d < p {
+                    d
+                } else if d < p + s {
+                    p + r * s + (d - p)
+                } else {
+                    p + count * s + (d - p - s)
+                };
+                for (k, v) in whitened.into_iter().enumerate() {
+                    matrix[(row + k, column)] = v;
+                }
+            }
+            row += height;
+        }
+        matrix.iter().all(|v| v.is_finite()).then_some(matrix)
+    }
+
+    /// Covariance of the free numbers. The numbers of the noise model are taken along: under feedback their estimates are
+    /// correlated with those of the plant.
+    pub fn covariance(&mut self, point: &[f64]) -> DMatrix<f64> {
+        let m = point.len();
+        let nothing_known = || DMatrix::from_diagonal_element(m, m, f64::INFINITY);
+        let Some(runs) = self.at(point) else {
+            return nothing_known();
+        };
+        let Some(plant) = self.jacobian(&runs) else {
+            return nothing_known();
+        };
+        let of_noise = self.noise_columns(&runs.residual);
+        let all = DMatrix::from_fn(plant.nrows(), m + of_noise.len(), |i, j| {
+            match j.checked_sub(m) {
+                None => plant[(i, j)],
+                Some(j) => of_noise[j][i],
+            }
+        });
+        // Information of the location of Student's t: (v + 1)/(v + 3) of that of a Gaussian of its scale.
+        let v = self.noise.degrees;
+        let information = if v.is_finite() {
+            (v + 1.0) / (v + 3.0)
+        } else {
+            1.0
+        };
+        invert(&(information * all.tr_mul(&all)))
+            .map_or_else(nothing_known, |c| c.view((0, 0), (m, m)).into_owned())
+    }
+
+    /// Derivatives of the whitened residual by the coefficients of the colours, by differences.
+    fn noise_columns(&self, residual: &Series) -> Vec<Vec<f64>> {
+        const STEP: f64 = 1e-6;
+        let base = self.noise.whiten_kept(residual, &self.problem.mask);
+        let mut columns = Vec::new();
+        for (o, colour) in self.noise.colours.iter().enumerate() {
+            for i in 0..colour.len() {
+                let moved = [STEP, -STEP].into_iter().find_map(|step| {
+                    let (mut ar, mut ma) = (colour.ar.clone(), colour.ma.clone());
+                    match i.checked_sub(ar.len()) {
+                        None => ar[i] += step,
+                        Some(j) => ma[j] += step,
+                    }
+                    Some((step, Colour::new(ar, ma)?))
+                });
+                let Some((step, moved)) = moved else { continue };
+                let mut noise = self.noise.clone();
+                noise.colours[o] = moved;
+                let whitened = noise.whiten_kept(residual, &self.problem.mask);
+                columns.push(
+                    whitened
+                        .iter()
+                        .zip(&base)
+                        .map(|(a, b)| (a - b) / step)
+                        .collect(),
+                );
+            }
+        }
+        columns
+    }
+}
+
+impl Objective for Deviance<'_, '_> {
+    fn deviance(&mut self, point: &[f64]) -> Option<f64> {
+        let runs = self.run(point)?;
+        let deviance = self.noise.deviance(&runs.residual, &self.problem.mask);
+        let runs = std::mem::replace(&mut self.last, Some(runs));
+        if let Some(runs) = runs {
+            self.accepted = Some(runs);
+        }
+        deviance.is_finite().then_some(deviance)
+    }
+
+    fn curvature(&mut self, point: &[f64]) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let runs = self.at(point)?;
+        let jacobian = self.jacobian(&runs)?;
+        let e = self.noise.whiten_kept(&runs.residual, &self.problem.mask);
+        let weights: Vec<f64> = e.iter().map(|&e| self.noise.weight(e)).collect();
+        let mut weighted = jacobian.clone();
+        for mut column in weighted.column_iter_mut() {
+            column.iter_mut().zip(&weights).for_each(|(v, w)| *v *= w);
+        }
+        let descent = weighted.tr_mul(&DVector::from_vec(e));
+        Some((weighted.tr_mul(&jacobian), descent))
+    }
+}
+
+/// Inverse of an information matrix, on the scale of its own diagonal; what moves nothing has an infinite variance.
+fn invert(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let m = information.nrows();
+    let used: Vec<usize> = (0..m).filter(|&i| information[(i, i)] > 0.0).collect();
+    let scale: Vec<f64> = used.iter().map(|&i| information[(i, i)].sqrt()).collect();
+    let k = used.len();
+    let unit = DMatrix::from_fn(k, k, |a, b| {
+        let r = information[(used[a], used[b])] / (scale[a] * scale[b]);
+        r + if a == b { RIDGE } else { 0.0 }
+    });
+    let inverse = unit.cholesky()?.inverse();
+    let mut covariance = DMatrix::zeros(m, m);
+    (0..m).for_each(|i| covariance[(i, i)] = f64::INFINITY);
+    for (a, &i) in used.iter().enumerate() {
+        for (b, &j) in used.iter().enumerate() {
+            covariance[(i, j)] = inverse[(a, b)] / (scale[a] * scale[b]);
+        }
+    }
+    Some(covariance)
+}

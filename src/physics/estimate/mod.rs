@@ -1,0 +1,290 @@
+//! Grey-box estimation: parameters and initial states of a plant in equations by maximum likelihood, with their covariance.
+//!
+//! Two forms. *Free run*: the plant is simulated from the inputs alone, and what is left is coloured noise,
+//! `y = simulated + H e`. *Innovation form*: an observer with a constant gain, `x += K (y - yhat)` after each sample, and what is
+//! left is white; for plants that integrate or are unstable, and for noise that enters the states. The likelier form, by
+//! Schwarz's criterion, is taken. Both are prediction error methods (L. Ljung, *System Identification*, 2nd ed., chapters 7
+//! and 9), which hold under feedback as long as the noise model does.
+
+mod determined;
+mod deviance;
+mod observer;
+mod optimise;
+mod problem;
+mod profile;
+
+pub use determined::Undetermined;
+pub use problem::{EstimateError, PlantRecording};
+
+use nalgebra::DMatrix;
+
+use self::deviance::Deviance;
+use self::optimise::{Effort, minimise};
+use self::problem::Problem;
+use super::simulate::{Hold, Plant, Point};
+use crate::noise::{Colours, Noise};
+
+/// How the predictions of a plant are formed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// From the inputs alone; noise is added to the outputs.
+    FreeRun,
+    /// From the inputs and the outputs so far.
+    Innovation,
+}
+
+/// What is estimated, and how.
+#[derive(Debug, Clone)]
+pub struct EstimateOptions {
+    /// Which parameters are free, in the order of [`ModelSpec::parameters`](super::ModelSpec::parameters).
+    pub free: Vec<bool>,
+    /// How inputs behave between samples.
+    pub hold: Hold,
+    /// The form; none chooses by likelihood.
+    pub form: Option<Form>,
+}
+
+/// An estimated parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EstimatedParameter {
+    /// Place in [`ModelSpec::parameters`](super::ModelSpec::parameters).
+    pub index: usize,
+    /// Estimate.
+    pub value: f64,
+    /// Standard deviation.
+    pub std: f64,
+    /// 95 % interval: by the profile of the likelihood where that is not a parabola.
+    pub interval: (f64, f64),
+    /// True when it is at one of its bounds.
+    pub at_bound: bool,
+}
+
+/// A plant with its estimated parameters.
+#[derive(Debug, Clone)]
+pub struct PlantEstimate {
+    /// Parameters and, for each recording, initial states.
+    pub points: Vec<Point>,
+    /// The free parameters.
+    pub parameters: Vec<EstimatedParameter>,
+    /// Covariance of the free parameters, in their order.
+    pub covariance: DMatrix<f64>,
+    /// Standard deviations of the free initial states, for each recording; 0 for those that are certain.
+    pub start_std: Vec<Vec<f64>>,
+    /// The form that was taken.
+    pub form: Form,
+    /// Gain of the observer, for the innovation form.
+    pub gain: Option<DMatrix<f64>>,
+    /// `-2 log` likelihood of each form that was fitted.
+    pub deviance: f64,
+    /// Schwarz's criterion of the form taken, and of the other where it was fitted.
+    pub criterion: f64,
+    /// Schwarz's criterion of the other form.
+    pub other_criterion: Option<f64>,
+    /// Values that were fitted.
+    pub samples: usize,
+    /// Standard deviation of the innovations of each output.
+    pub noise_std: Vec<f64>,
+    /// Poles, zeros and tails of the noise: autoregression and moving average of each output, degrees of freedom.
+    pub noise: (Vec<Vec<f64>>, Vec<Vec<f64>>, f64),
+    /// Free run: a column for each recording and output.
+    pub simulated: Vec<Vec<f64>>,
+    /// Whitened residuals: a column for each recording and output.
+    pub innovations: Vec<Vec<f64>>,
+    /// What the recordings do not determine.
+    pub undetermined: Vec<Undetermined>,
+}
+
+/// Rounds of noise model and parameters.
+const ROUNDS: usize = 4;
+/// A round that gains less than this in the deviance is the last.
+const SETTLED: f64 = 0.02;
+/// Effort of a search.
+const SEARCH: Effort = Effort {
+    iterations: 60,
+    settled: 1e-2,
+};
+const ROUND: Effort = Effort {
+    iterations: 20,
+    settled: 1e-3,
+};
+/// Effort for a first look at a start.
+const GLANCE: Effort = Effort {
+    iterations: 3,
+    settled: 1.0,
+};
+/// Starts that are drawn within the bounds besides the values of the text, and how many of all are searched to the end.
+const DRAWN_STARTS: usize = 4;
+const KEPT_STARTS: usize = 2;
+
+/// Estimates a plant from recordings of it.
+///
+/// # Errors
+/// When nothing is free, the recordings do not fit the plant, or the plant cannot be simulated at any start.
+pub fn estimate(
+    plant: &Plant,
+    recordings: &[PlantRecording],
+    options: &EstimateOptions,
+) -> Result<PlantEstimate, EstimateError> {
+    let problem = Problem::new(plant, recordings, options)?;
+    let mut free_run = match options.form {
+        Some(Form::Innovation) => None,
+        _ => fit_free_run(&problem, None),
+    };
+    // Where free run leaves white noise an observer has nothing to correct.
+    let coloured = free_run
+        .as_ref()
+        .is_none_or(|f| f.noise.colours.iter().any(|c| c.len() > 0));
+    let innovation = match options.form {
+        Some(Form::FreeRun) => None,
+        None if !coloured => None,
+        _ => observer::fit(&problem, free_run.as_ref().map(|f| f.point.as_slice())),
+    };
+    if let (None, Some(other)) = (options.form, &innovation) {
+        let again = fit_free_run(&problem, Some(&other.point));
+        let better = |a: &Fit| free_run.as_ref().is_none_or(|b| a.criterion < b.criterion);
+        if again.as_ref().is_some_and(better) {
+            free_run = again;
+        }
+    }
+    let (best, other) = match (free_run, innovation) {
+        (Some(a), Some(b)) if b.criterion < a.criterion => (b, Some(a.criterion)),
+        (Some(a), b) => (a, b.map(|b| b.criterion)),
+        (None, Some(b)) => (b, None),
+        (None, None) => return Err(problem.why_not()),
+    };
+    Ok(finish(&problem, best, other))
+}
+
+/// A fit in one of the forms.
+struct Fit {
+    form: Form,
+    /// Parameters, initial states, and the gain where there is one.
+    point: Vec<f64>,
+    noise: Noise,
+    deviance: f64,
+    criterion: f64,
+}
+
+/// The fit in free run: from the point of the other form, or from the values of the text and draws within the bounds.
+fn fit_free_run(problem: &Problem, other: Option<&[f64]>) -> Option<Fit> {
+    let nominal = problem.nominal();
+    let mut objective = Deviance::new(problem, Form::FreeRun, Noise::unit(problem.outputs()));
+    let mut point = match other {
+        Some(point) => point[..nominal.len()].to_vec(),
+        None => {
+            let mut starts = vec![nominal];
+            starts.extend(problem.draws(DRAWN_STARTS));
+            let glance = |mut point: Vec<f64>| {
+                let mut objective =
+                    Deviance::new(problem, Form::FreeRun, Noise::unit(problem.outputs()));
+                Some((
+                    white_fit(&mut objective, problem, &mut point, GLANCE)?,
+                    point,
+                ))
+            };
+            let mut tried: Vec<(f64, Vec<f64>)> = starts.into_iter().filter_map(glance).collect();
+            tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+            tried.truncate(KEPT_STARTS);
+            for (deviance, point) in &mut tried {
+                *deviance = white_fit(&mut objective, problem, point, SEARCH)?;
+            }
+            tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?.1
+        }
+    };
+    let mut last = f64::INFINITY;
+    for _ in 0..ROUNDS {
+        let residual = objective.residual(&point)?;
+        objective.noise =
+            Noise::estimate(&residual, problem.outputs(), &problem.mask, Colours::All);
+        let deviance = minimise(&mut objective, &mut point, &problem.ranges(), ROUND)?;
+        if last - deviance < SETTLED {
+            last = deviance;
+            break;
+        }
+        last = deviance;
+    }
+    let criterion = problem.criterion(last, objective.noise.len(), 0);
+    Some(Fit {
+        form: Form::FreeRun,
+        point,
+        noise: objective.noise,
+        deviance: last,
+        criterion,
+    })
+}
+
+/// Improves a point under white noise whose size is that of what is left; gives the deviance with the size at the end.
+fn white_fit(
+    objective: &mut Deviance,
+    problem: &Problem,
+    point: &mut Vec<f64>,
+    effort: Effort,
+) -> Option<f64> {
+    for _ in 0..2 {
+        objective.noise = objective.rescale(point)?;
+        minimise(objective, point, &problem.ranges(), effort)?;
+    }
+    let residual = objective.residual(point)?;
+    Some(
+        Noise::white(&residual, problem.outputs(), &problem.mask)
+            .deviance(&residual, &problem.mask),
+    )
+}
+
+fn finish(problem: &Problem, fit: Fit, other_criterion: Option<f64>) -> PlantEstimate {
+    let mut objective = match fit.form {
+        Form::FreeRun => Deviance::new(problem, Form::FreeRun, fit.noise.clone()),
+        Form::Innovation => Deviance::new(problem, Form::Innovation, fit.noise.clone()),
+    };
+    let covariance = objective.covariance(&fit.point);
+    let free = problem.free.clone();
+    let undetermined = determined::undetermined(problem, &fit.point, &covariance);
+    let ranges = problem.ranges();
+    let parameters = free
+        .iter()
+        .enumerate()
+        .map(|(i, &index)| {
+            let std = covariance[(i, i)].max(0.0).sqrt();
+            let value = fit.point[i];
+            let at_bound = value <= ranges[i].min || value >= ranges[i].max;
+            let interval = profile::interval(&mut objective, problem, &fit, &covariance, i);
+            EstimatedParameter {
+                index,
+                value,
+                std,
+                interval,
+                at_bound,
+            }
+        })
+        .collect();
+    let start_std = problem.start_stds(&covariance);
+    let points = problem.points(&fit.point);
+    let residual = objective.residual(&fit.point).unwrap_or_default();
+    let innovations = fit.noise.whiten(&residual, &problem.mask);
+    let simulated = Deviance::new(problem, Form::FreeRun, fit.noise.clone())
+        .simulated(&fit.point)
+        .unwrap_or_default();
+    PlantEstimate {
+        points,
+        parameters,
+        covariance: covariance
+            .view((0, 0), (free.len(), free.len()))
+            .into_owned(),
+        start_std,
+        form: fit.form,
+        gain: (fit.form == Form::Innovation).then(|| problem.gain(&fit.point)),
+        deviance: fit.deviance,
+        criterion: fit.criterion,
+        other_criterion,
+        samples: problem.count(),
+        noise_std: fit.noise.scale.clone(),
+        noise: (
+            fit.noise.colours.iter().map(|c| c.ar.clone()).collect(),
+            fit.noise.colours.iter().map(|c| c.ma.clone()).collect(),
+            fit.noise.degrees,
+        ),
+        simulated,
+        innovations,
+        undetermined,
+    }
+}

@@ -1,0 +1,154 @@
+//! The innovation form: an observer with a constant gain, estimated with the parameters.
+
+use nalgebra::DMatrix;
+
+use super::deviance::Deviance;
+use super::optimise::{Range, minimise};
+use super::problem::Problem;
+use super::{Fit, Form, ROUND, ROUNDS, SEARCH, SETTLED};
+use crate::noise::{Colours, Noise};
+
+/// Process noise of a sample as a part of the spread of each state, from which gains are computed to start from.
+const DIFFUSION: [f64; 4] = [1e-3, 1e-2, 1e-1, 1.0];
+/// Measurement noise as a part of the spread of each output.
+const MEASUREMENT: f64 = 0.02;
+/// Steps of the Riccati equation.
+const STEPS: usize = 300;
+
+/// The fit in innovation form, from a point of the other form or from the values of the text.
+pub(super) fn fit(problem: &Problem, from: Option<&[f64]>) -> Option<Fit> {
+    let (n, l) = (problem.states(), problem.outputs());
+    if n == 0 {
+        return None;
+    }
+    let nominal = from.map_or_else(|| problem.nominal(), <[f64]>::to_vec);
+    let mut starts: Vec<(f64, Vec<f64>)> = Vec::new();
+    for gain in gains(problem) {
+        let mut point = nominal.clone();
+        point.extend(
+            (0..n)
+                .flat_map(|i| (0..l).map(move |j| (i, j)))
+                .map(|at| gain[at]),
+        );
+        let mut objective = Deviance::new(problem, Form::Innovation, Noise::unit(l));
+        let Some(noise) = objective.rescale(&point) else {
+            continue;
+        };
+        objective.noise = noise;
+        let Some(residual) = objective.residual(&point) else {
+            continue;
+        };
+        starts.push((objective.noise.deviance(&residual, &problem.mask), point));
+    }
+    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut ranges = problem.ranges();
+    ranges.extend((0..n * l).map(|_| Range {
+        min: f64::NEG_INFINITY,
+        max: f64::INFINITY,
+        reach: f64::INFINITY,
+    }));
+    let mut best: Option<Fit> = None;
+    for (_, mut point) in starts.into_iter().take(2) {
+        let mut objective = Deviance::new(problem, Form::Innovation, Noise::unit(l));
+        let mut last = f64::INFINITY;
+        for round in 0..ROUNDS + 2 {
+            let Some(residual) = objective.residual(&point) else {
+                break;
+            };
+            objective.noise = if round < 2 {
+                Noise::white(&residual, l, &problem.mask)
+            } else {
+                Noise::estimate(&residual, l, &problem.mask, Colours::White)
+            };
+            let effort = if round < 2 { SEARCH } else { ROUND };
+            let Some(deviance) = minimise(&mut objective, &mut point, &ranges, effort) else {
+                break;
+            };
+            let settled = last - deviance < SETTLED;
+            last = deviance;
+            if settled && round >= 2 {
+                break;
+            }
+        }
+        let criterion = problem.criterion(last, objective.noise.len(), n * l);
+        if last.is_finite() && best.as_ref().is_none_or(|b| criterion < b.criterion) {
+            best = Some(Fit {
+                form: Form::Innovation,
+                point,
+                noise: objective.noise,
+                deviance: last,
+                criterion,
+            });
+        }
+    }
+    best
+}
+
+/// Gains of stationary Kalman filters of the plant linearised at its mean, for several sizes of process noise.
+fn gains(problem: &Problem) -> Vec<DMatrix<f64>> {
+    let (n, l) = (problem.states(), problem.outputs());
+    let plant = problem.plant;
+    let mut found = Vec::new();
+    problem.each(|excitation, outputs| {
+        if !found.is_empty() {
+            return;
+        }
+        let point = plant.nominal();
+        let start = plant.start(&point);
+        let mean = |c: &[f64]| {
+            let known: Vec<f64> = c.iter().copied().filter(|v| v.is_finite()).collect();
+            let m = known.iter().sum::<f64>() / known.len().max(1) as f64;
+            let s = known.iter().map(|v| (v - m).powi(2)).sum::<f64>() / known.len().max(1) as f64;
+            (m, s.sqrt())
+        };
+        let inputs: Vec<f64> = excitation.inputs.iter().map(|c| mean(c).0).collect();
+        let (centre, spread): (Vec<f64>, Vec<f64>) = match plant.simulate(&point, excitation, None)
+        {
+            Ok(run) => run.states.iter().map(|c| mean(c)).unzip(),
+            Err(_) => start.iter().map(|&x| (x, x.abs().max(1.0))).unzip(),
+        };
+        let linear = plant.linearise(&point, &centre, &inputs, excitation.start_time);
+        let (phi, _) = linear.discrete(excitation.sample_time);
+        if !phi.iter().chain(linear.c.iter()).all(|v| v.is_finite()) {
+            return;
+        }
+        let r = DMatrix::from_fn(l, l, |i, j| {
+            if i == j {
+                (MEASUREMENT * mean(outputs[i]).1).powi(2).max(1e-300)
+            } else {
+                0.0
+            }
+        });
+        for rho in DIFFUSION {
+            let q = DMatrix::from_fn(n, n, |i, j| {
+                if i == j {
+                    (rho * spread[i].max(1e-9 * centre[i].abs()).max(1e-12)).powi(2)
+                } else {
+                    0.0
+                }
+            });
+            found.extend(stationary(&phi, &linear.c, &q, &r));
+        }
+    });
+    found
+}
+
+/// Gain of the filtered state, `P C' (C P C' + R)^-1`, after many steps.
+fn stationary(
+    phi: &DMatrix<f64>,
+    c: &DMatrix<f64>,
+    q: &DMatrix<f64>,
+    r: &DMatrix<f64>,
+) -> Option<DMatrix<f64>> {
+    let n = phi.nrows();
+    let mut p = q * 100.0;
+    let mut gain = DMatrix::zeros(n, c.nrows());
+    for _ in 0..STEPS {
+        let s = c * &p * c.transpose() + r;
+        gain = s.cholesky()?.solve(&(c * &p)).transpose();
+        let left = DMatrix::identity(n, n) - &gain * c;
+        let filtered = &left * &p * left.transpose() + &gain * r * gain.transpose();
+        p = phi * filtered * phi.transpose() + q;
+    }
+    gain.iter().all(|v| v.is_finite()).then_some(gain)
+}

@@ -1,0 +1,343 @@
+//! What is free in an estimation, and the deviance of the recordings with its derivatives.
+
+use nalgebra::DMatrix;
+use rand::{RngExt, SeedableRng};
+
+use super::EstimateOptions;
+use super::optimise::Range;
+use crate::noise::Mask;
+use crate::physics::simulate::{Excitation, Plan, Plant, Point, SimulationError};
+use crate::physics::spec::VariableKind;
+
+/// A recording of a plant.
+#[derive(Debug, Clone)]
+pub struct PlantRecording {
+    /// A column for each input, in the order of declaration.
+    pub inputs: Vec<Vec<f64>>,
+    /// A column for each output, in the order of declaration; `NaN` is missing.
+    pub outputs: Vec<Vec<f64>>,
+    /// Seconds from sample to sample.
+    pub sample_time: f64,
+    /// Time of the first sample.
+    pub start_time: f64,
+}
+
+/// Why a plant cannot be estimated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum EstimateError {
+    /// No recording, or one without samples.
+    #[error("there is no recording to estimate from")]
+    Empty,
+    /// A recording of another plant.
+    #[error("recording {recording} has {found} {what}, the plant {expected}")]
+    Columns {
+        /// Counted from 1.
+        recording: usize,
+        /// Inputs or outputs.
+        what: &'static str,
+        /// Of the plant.
+        expected: usize,
+        /// Of the recording.
+        found: usize,
+    },
+    /// More is free than there are values.
+    #[error(
+        "{free} parameters and initial states are free, and the recordings have only {samples} values: fix some of them, or record longer"
+    )]
+    TooShort {
+        /// Parameters and initial states.
+        free: usize,
+        /// Values.
+        samples: usize,
+    },
+    /// No start can be simulated.
+    #[error("the plant cannot be simulated with the values of the text: {0}")]
+    Simulation(#[from] SimulationError),
+}
+
+/// Recordings, plant and what is free.
+pub(super) struct Problem<'a> {
+    pub plant: &'a Plant,
+    pub recordings: &'a [PlantRecording],
+    options: &'a EstimateOptions,
+    pub mask: Mask,
+    /// Places of the free parameters.
+    pub free: Vec<usize>,
+    /// Places of the states whose start is free.
+    pub starts: Vec<usize>,
+    /// Ramps of the switches, for each recording.
+    pub plans: Vec<Plan>,
+    nominal: Point,
+}
+
+/// Columns of a recording, borrowed.
+pub(super) struct Columns<'a> {
+    pub inputs: Vec<&'a [f64]>,
+    pub outputs: Vec<&'a [f64]>,
+}
+
+impl PlantRecording {
+    pub(super) fn columns(&self) -> Columns<'_> {
+        Columns {
+            inputs: self.inputs.iter().map(Vec::as_slice).collect(),
+            outputs: self.outputs.iter().map(Vec::as_slice).collect(),
+        }
+    }
+
+    fn samples(&self) -> usize {
+        self.outputs.first().map_or(0, Vec::len)
+    }
+}
+
+impl<'a> Problem<'a> {
+    pub fn new(
+        plant: &'a Plant,
+        recordings: &'a [PlantRecording],
+        options: &'a EstimateOptions,
+    ) -> Result<Self, EstimateError> {
+        let spec = &plant.spec;
+        let (inputs, outputs) = (spec.inputs().len(), spec.outputs().len());
+        if recordings.is_empty() || recordings.iter().any(|r| r.samples() == 0) {
+            return Err(EstimateError::Empty);
+        }
+        for (i, r) in recordings.iter().enumerate() {
+            for (what, expected, found) in [
+                ("inputs", inputs, r.inputs.len()),
+                ("outputs", outputs, r.outputs.len()),
+            ] {
+                if expected != found {
+                    return Err(EstimateError::Columns {
+                        recording: i + 1,
+                        what,
+                        expected,
+                        found,
+                    });
+                }
+            }
+        }
+        let mask: Mask = recordings
+            .iter()
+            .flat_map(|r| &r.outputs)
+            .map(|y| y.iter().map(|v| v.is_finite()).collect())
+            .collect();
+        let free = (0..spec.parameters().len())
+            .filter(|&i| options.free.get(i).copied().unwrap_or(true))
+            .collect();
+        let states = spec.states();
+        let starts = (0..states.len())
+            .filter(|&i| !spec.variable(states[i]).fixed)
+            .collect();
+        let nominal = plant.nominal();
+        let mut problem = Self {
+            plant,
+            recordings,
+            options,
+            mask,
+            free,
+            starts,
+            plans: Vec::new(),
+            nominal,
+        };
+        let free = problem.nominal().len();
+        let samples = problem.count();
+        if samples <= 2 * free {
+            return Err(EstimateError::TooShort { free, samples });
+        }
+        problem.plans = recordings
+            .iter()
+            .map(|r| {
+                let columns = r.columns();
+                let run = plant.simulate(&problem.nominal, &problem.excitation(r, &columns), None);
+                run.map(|t| t.plan).unwrap_or_default()
+            })
+            .collect();
+        Ok(problem)
+    }
+
+    /// Why the values of the text cannot be simulated.
+    pub fn why_not(&self) -> EstimateError {
+        for r in self.recordings {
+            let columns = r.columns();
+            if let Err(e) = self
+                .plant
+                .simulate(&self.nominal, &self.excitation(r, &columns), None)
+            {
+                return EstimateError::Simulation(e);
+            }
+        }
+        EstimateError::Empty
+    }
+
+    pub fn excitation<'b>(&self, r: &PlantRecording, columns: &'b Columns<'b>) -> Excitation<'b> {
+        Excitation {
+            inputs: &columns.inputs,
+            length: r.samples(),
+            sample_time: r.sample_time,
+            start_time: r.start_time,
+            hold: self.options.hold,
+        }
+    }
+
+    pub fn outputs(&self) -> usize {
+        self.plant.spec.outputs().len()
+    }
+
+    pub fn states(&self) -> usize {
+        self.plant.spec.states().len()
+    }
+
+    /// Values that count.
+    pub fn count(&self) -> usize {
+        self.mask.iter().flatten().filter(|k| **k).count()
+    }
+
+    /// Free numbers at the values of the text: parameters, then the initial states of each recording.
+    pub fn nominal(&self) -> Vec<f64> {
+        let start = self.plant.start(&self.nominal);
+        let starts = self
+            .recordings
+            .iter()
+            .flat_map(|_| self.starts.iter().map(|&i| start[i]));
+        self.free
+            .iter()
+            .map(|&i| self.nominal.parameters[i])
+            .chain(starts)
+            .collect()
+    }
+
+    /// Bounds of the free numbers.
+    pub fn ranges(&self) -> Vec<Range> {
+        let spec = &self.plant.spec;
+        let parameters = spec.parameters();
+        let of_parameters = self.free.iter().map(|&i| {
+            let v = spec.variable(parameters[i]);
+            let width = v.max - v.min;
+            let size = 2.0
+                * self.nominal.parameters[i]
+                    .abs()
+                    .max(v.nominal.unwrap_or(0.0).abs());
+            let reach = if width.is_finite() {
+                width
+            } else if size > 0.0 {
+                size
+            } else {
+                f64::INFINITY
+            };
+            Range {
+                min: v.min,
+                max: v.max,
+                reach,
+            }
+        });
+        let states = spec.states();
+        let of_starts = self.recordings.iter().flat_map(|_| {
+            self.starts.iter().map(|&i| {
+                let v = spec.variable(states[i]);
+                Range {
+                    min: v.min,
+                    max: v.max,
+                    reach: f64::INFINITY,
+                }
+            })
+        });
+        of_parameters.chain(of_starts).collect()
+    }
+
+    /// Starts within the bounds, from a fixed seed: where a parameter has both bounds anywhere between, else within a factor
+    /// of 3 of its value.
+    pub fn draws(&self, count: usize) -> Vec<Vec<f64>> {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        let (nominal, ranges) = (self.nominal(), self.ranges());
+        (0..count)
+            .map(|_| {
+                let mut point = nominal.clone();
+                for (p, r) in point.iter_mut().zip(&ranges).take(self.free.len()) {
+                    let share: f64 = random.random();
+                    *p = if (r.max - r.min).is_finite() {
+                        r.min + share * (r.max - r.min)
+                    } else {
+                        (*p * 3f64.powf(2.0 * share - 1.0)).clamp(r.min, r.max)
+                    };
+                }
+                point
+            })
+            .collect()
+    }
+
+    /// Parameters and initial states of each recording.
+    pub fn points(&self, numbers: &[f64]) -> Vec<Point> {
+        (0..self.recordings.len())
+            .map(|r| {
+                let mut point = self.nominal.clone();
+                for (&i, &v) in self.free.iter().zip(numbers) {
+                    point.parameters[i] = v;
+                }
+                let first = self.free.len() + r * self.starts.len();
+                for (&i, &v) in self.starts.iter().zip(&numbers[first..]) {
+                    point.start[i] = Some(v);
+                }
+                point
+            })
+            .collect()
+    }
+
+    /// Schwarz's criterion.
+    pub fn criterion(&self, deviance: f64, of_noise: usize, of_gain: usize) -> f64 {
+        let numbers = self.nominal().len() + of_noise + of_gain;
+        deviance + numbers as f64 * (self.count() as f64).ln()
+    }
+
+    /// Gain of the observer in the numbers behind the initial states.
+    pub fn gain(&self, numbers: &[f64]) -> DMatrix<f64> {
+        let (n, l) = (self.states(), self.outputs());
+        let gain = &numbers[numbers.len() - n * l..];
+        DMatrix::from_fn(n, l, |i, j| gain[i * l + j])
+    }
+
+    /// Standard deviations of the initial states of each recording; 0 where they are certain.
+    pub fn start_stds(&self, covariance: &DMatrix<f64>) -> Vec<Vec<f64>> {
+        (0..self.recordings.len())
+            .map(|r| {
+                let mut stds = vec![0.0; self.states()];
+                for (k, &i) in self.starts.iter().enumerate() {
+                    let at = self.free.len() + r * self.starts.len() + k;
+                    stds[i] = covariance[(at, at)].max(0.0).sqrt();
+                }
+                stds
+            })
+            .collect()
+    }
+}
+
+impl Problem<'_> {
+    /// Names of the free parameters.
+    pub fn names(&self) -> Vec<String> {
+        let spec = &self.plant.spec;
+        let parameters: Vec<_> = spec.of_kind(VariableKind::Parameter).collect();
+        self.free
+            .iter()
+            .map(|&i| spec.variable(parameters[i]).name.clone())
+            .collect()
+    }
+
+    /// Magnitude of each free parameter: the width of its bounds, or its value.
+    pub fn magnitudes(&self, point: &[f64]) -> Vec<f64> {
+        let ranges = self.ranges();
+        let nominal = self.nominal();
+        (0..self.free.len())
+            .map(|i| match ranges[i].max - ranges[i].min {
+                width if width.is_finite() => width,
+                _ => point[i].abs().max(nominal[i].abs()),
+            })
+            .collect()
+    }
+
+    /// The excitation and outputs of each recording, for `of`.
+    pub fn each(&self, mut of: impl FnMut(&Excitation, &[&[f64]])) {
+        for r in self.recordings {
+            let columns = r.columns();
+            of(&self.excitation(r, &columns), &columns.outputs);
+        }
+    }
+}

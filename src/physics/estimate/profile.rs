@@ -1,0 +1,97 @@
+//! Intervals from the profile of the likelihood, where that is not the parabola of the covariance.
+
+use nalgebra::DMatrix;
+
+use super::Fit;
+use super::deviance::Deviance;
+use super::optimise::{Effort, Objective, Range, minimise};
+use super::problem::Problem;
+
+/// 95 % point of the chi-square distribution with one degree of freedom.
+const LEVEL: f64 = 3.841_458_820_694_124;
+/// The parabola is believed where the deviance at its ends is within this of the level.
+const PARABOLA: (f64, f64) = (0.75 * LEVEL, 1.3 * LEVEL);
+/// The same along the straight line that the covariance foretells, on which the deviance is at least that of the profile.
+const STRAIGHT: (f64, f64) = (0.85 * LEVEL, 1.15 * LEVEL);
+/// Effort for the other numbers at one value of the parameter.
+const OTHERS: Effort = Effort {
+    iterations: 6,
+    settled: 1e-2,
+};
+/// Values tried on a side.
+const TRIES: usize = 5;
+
+/// The 95 % interval of free parameter `i`.
+pub(super) fn interval(
+    objective: &mut Deviance,
+    problem: &Problem,
+    fit: &Fit,
+    covariance: &DMatrix<f64>,
+    i: usize,
+) -> (f64, f64) {
+    let std = covariance[(i, i)].max(0.0).sqrt();
+    let mut ranges = problem.ranges();
+    ranges.extend(fit.point[ranges.len()..].iter().map(|_| Range {
+        min: f64::NEG_INFINITY,
+        max: f64::INFINITY,
+        reach: f64::INFINITY,
+    }));
+    let own = ranges[i];
+    let value = fit.point[i];
+    if !std.is_finite() || std <= 0.0 {
+        return (own.min, own.max);
+    }
+    let base = objective.deviance(&fit.point).unwrap_or(fit.deviance);
+    let mut side = |sign: f64| {
+        let mut at = value + sign * LEVEL.sqrt() * std;
+        // Where the covariance says that the others go with it.
+        let along: Vec<f64> = (0..fit.point.len())
+            .map(|j| fit.point[j] + covariance[(j, i)] * sign * LEVEL.sqrt() / std)
+            .collect();
+        let inside = along
+            .iter()
+            .zip(&ranges)
+            .all(|(p, r)| p.is_finite() && *p > r.min && *p < r.max);
+        if inside
+            && objective
+                .deviance(&along)
+                .is_some_and(|d| (STRAIGHT.0..STRAIGHT.1).contains(&(d - base)))
+        {
+            return at;
+        }
+        let mut best = at;
+        for attempt in 0..TRIES {
+            let tried = at.clamp(own.min, own.max);
+            let mut point = fit.point.clone();
+            point[i] = tried;
+            let mut held = ranges.clone();
+            held[i] = Range {
+                min: tried,
+                max: tried,
+                reach: 0.0,
+            };
+            let Some(deviance) = minimise(objective, &mut point, &held, OTHERS) else {
+                // What cannot be simulated is outside.
+                at = 0.5 * (value + tried);
+                continue;
+            };
+            let rise = (deviance - base).max(1e-6);
+            best = tried;
+            if (PARABOLA.0..PARABOLA.1).contains(&rise) {
+                // Within what the parabola says at the first attempt; found at a later one.
+                return if attempt == 0 {
+                    tried
+                } else {
+                    value + (tried - value) * (LEVEL / rise).sqrt()
+                };
+            }
+            if tried != at && rise < LEVEL {
+                return tried; // the bound is inside the interval
+            }
+            at = value + (tried - value) * (LEVEL / rise).sqrt().clamp(0.2, 4.0);
+        }
+        best
+    };
+    let (low, high) = (side(-1.0), side(1.0));
+    (low.max(own.min), high.min(own.max))
+}

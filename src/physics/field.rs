@@ -1,0 +1,267 @@
+//! The right-hand side of a plant at an instant: inputs as they are held, delays, one sweep of the tape.
+
+use super::dual::Dual;
+use super::simulate::{Excitation, Hold};
+use super::tape::{Frame, Tape};
+
+/// Columns of a Jacobian that are computed in one sweep.
+pub(super) const LANES: usize = 8;
+
+/// What a delayed expression was, for one `delay`.
+#[derive(Debug, Clone)]
+enum Past<const M: usize> {
+    /// Its value at every sample: it depends on inputs only.
+    Series(Vec<Dual<M>>),
+    /// Its value at every step so far.
+    History(Vec<(f64, Dual<M>)>),
+}
+
+/// Right-hand side with its inputs.
+pub(super) struct Field<'a, const M: usize> {
+    pub tape: &'a Tape,
+    pub frame: Frame<M>,
+    jacobian: Frame<LANES>,
+    excitation: &'a Excitation<'a>,
+    sample: usize,
+    /// False until the frame of the Jacobian has the inputs of now.
+    inputs_in_jacobian: bool,
+    past: Vec<Past<M>>,
+    /// Sample whose held value a delayed input has now, for each delay.
+    source: Vec<usize>,
+}
+
+impl<'a, const M: usize> Field<'a, M> {
+    /// `frame` has parameters with their slopes.
+    pub fn new(tape: &'a Tape, mut frame: Frame<M>, excitation: &'a Excitation<'a>) -> Self {
+        tape.run_parameters(&mut frame);
+        let mut jacobian = tape.frame::<LANES>();
+        jacobian.width.clone_from(&frame.width);
+        for &p in &tape.parameters {
+            jacobian.slot[p].value = frame.slot[p].value;
+        }
+        tape.run_parameters(&mut jacobian);
+        let mut field = Self {
+            tape,
+            frame,
+            jacobian,
+            excitation,
+            sample: 0,
+            inputs_in_jacobian: false,
+            past: Vec::new(),
+            source: Vec::new(),
+        };
+        field.source = vec![0; tape.delays.len()];
+        field.past = field.pasts();
+        field
+    }
+
+    /// Values of the arguments of delays that depend on inputs only.
+    fn pasts(&mut self) -> Vec<Past<M>> {
+        let tape = self.tape;
+        let mut past: Vec<_> = tape
+            .delays
+            .iter()
+            .map(|d| {
+                if d.of_inputs {
+                    Past::Series(Vec::new())
+                } else {
+                    Past::History(Vec::new())
+                }
+            })
+            .collect();
+        if tape.delays.iter().any(|d| d.of_inputs) {
+            for k in 0..self.excitation.samples() {
+                self.begin(k);
+                for (past, delay) in past.iter_mut().zip(&tape.delays) {
+                    if let Past::Series(values) = past {
+                        values.push(self.frame.slot[delay.value]);
+                    }
+                }
+            }
+        }
+        past
+    }
+
+    /// Takes the inputs of a sample.
+    pub fn begin(&mut self, sample: usize) {
+        self.sample = sample;
+        self.inputs(0.0);
+    }
+
+    /// Inputs at a fraction of the sample.
+    fn inputs(&mut self, fraction: f64) {
+        let next = (self.sample + 1).min(self.excitation.samples() - 1);
+        for (&slot, column) in self.tape.inputs.iter().zip(self.excitation.inputs) {
+            let value = column[self.sample] + fraction * (column[next] - column[self.sample]);
+            self.frame.slot[slot].value = value;
+        }
+        self.tape.run_inputs(&mut self.frame);
+        self.inputs_in_jacobian = false;
+    }
+
+    /// Boundaries of the parts of a sample in which every delayed input is constant, as fractions of the sample.
+    pub fn boundaries(&self) -> Vec<Dual<M>> {
+        let mut boundaries = vec![Dual::constant(0.0)];
+        for delay in self.tape.delays.iter().filter(|d| d.of_inputs) {
+            let mut phase = self.frame.slot[delay.time];
+            phase
+                .slope
+                .iter_mut()
+                .for_each(|s| *s /= self.excitation.sample_time);
+            phase.value = (phase.value / self.excitation.sample_time).rem_euclid(1.0);
+            boundaries.push(phase);
+        }
+        boundaries.sort_by(|a, b| a.value.total_cmp(&b.value));
+        boundaries.push(Dual::constant(1.0));
+        boundaries
+    }
+
+    /// Chooses, for a part of the sample with this middle, the sample that each delayed input comes from.
+    pub fn part(&mut self, middle: f64) {
+        for (source, delay) in self.source.iter_mut().zip(&self.tape.delays) {
+            let back = self.frame.slot[delay.time].value / self.excitation.sample_time;
+            *source = (self.sample as f64 + middle - back).floor().max(0.0) as usize;
+        }
+    }
+
+    /// Derivatives of the states at an instant; the frame then holds all values.
+    pub fn evaluate(&mut self, time: &Dual<M>, x: &[Dual<M>], derivative: &mut [Dual<M>]) {
+        self.place(time);
+        for (&slot, x) in self.tape.states.iter().zip(x) {
+            self.frame.slot[slot] = *x;
+        }
+        self.tape.run_states(&mut self.frame);
+        for (&slot, d) in self.tape.derivatives.iter().zip(derivative) {
+            *d = self.frame.slot[slot];
+        }
+    }
+
+    /// Time, inputs and delayed values of an instant.
+    fn place(&mut self, time: &Dual<M>) {
+        self.frame.slot[self.tape.time] = *time;
+        if self.excitation.hold == Hold::Linear {
+            self.inputs(self.excitation.fraction(self.sample, time.value));
+        }
+        for (i, delay) in self.tape.delays.iter().enumerate() {
+            let lag = self.frame.slot[delay.time];
+            let at = time.plus(-1.0, &lag);
+            self.frame.slot[delay.result] = match &self.past[i] {
+                Past::Series(values) if values.is_empty() => Dual::constant(0.0),
+                Past::Series(values) => self.excitation.between(values, self.source[i], &at),
+                Past::History(steps) => interpolate(steps, &at),
+            };
+        }
+    }
+
+    /// Derivatives of the states and their Jacobian (by rows) at an instant, without the slopes in the `M` directions.
+    pub fn linearise(
+        &mut self,
+        time: &Dual<M>,
+        x: &[f64],
+        derivative: &mut [f64],
+        jacobian: &mut [f64],
+    ) {
+        self.place(time);
+        let n = x.len();
+        let (tape, frame) = (self.tape, &mut self.jacobian);
+        frame.slot[tape.time].value = time.value;
+        if !self.inputs_in_jacobian {
+            for &slot in &tape.inputs {
+                frame.slot[slot].value = self.frame.slot[slot].value;
+            }
+            tape.run_inputs(frame);
+            self.inputs_in_jacobian = true;
+        }
+        for delay in &tape.delays {
+            frame.slot[delay.result] = Dual::constant(self.frame.slot[delay.result].value);
+        }
+        for first in (0..n).step_by(LANES) {
+            for (i, (&slot, &x)) in tape.states.iter().zip(x).enumerate() {
+                let mut dual = Dual::constant(x);
+                if (first..first + LANES).contains(&i) {
+                    dual.slope[i - first] = 1.0;
+                }
+                frame.slot[slot] = dual;
+            }
+            tape.run_states(frame);
+            for (row, &slot) in tape.derivatives.iter().enumerate() {
+                derivative[row] = frame.slot[slot].value;
+                for column in first..(first + LANES).min(n) {
+                    jacobian[row * n + column] = frame.slot[slot].slope[column - first];
+                }
+            }
+        }
+    }
+
+    /// Keeps the delayed expressions of states at the end of a step.
+    pub fn remember(&mut self, time: f64) {
+        for (past, delay) in self.past.iter_mut().zip(&self.tape.delays) {
+            if let Past::History(steps) = past {
+                steps.push((time, self.frame.slot[delay.value]));
+            }
+        }
+    }
+
+    /// True when a delayed expression of states must be kept at every step.
+    pub fn remembers(&self) -> bool {
+        self.tape.delays.iter().any(|d| !d.of_inputs)
+    }
+
+    /// The shortest delay of an expression of states: no step may be longer.
+    pub fn shortest_delay(&self) -> f64 {
+        let of_states = self.tape.delays.iter().filter(|d| !d.of_inputs);
+        of_states
+            .map(|d| self.frame.slot[d.time].value)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Argument of each switch now.
+    pub fn switches(&self, into: &mut Vec<f64>) {
+        into.clear();
+        into.extend(self.tape.switches.iter().map(|s| self.frame.switch(s)));
+    }
+}
+
+/// Value at `at` between the steps so far, by the cubic through the four nearest; before the first step its value.
+fn interpolate<const M: usize>(steps: &[(f64, Dual<M>)], at: &Dual<M>) -> Dual<M> {
+    let (Some(first), Some(last)) = (steps.first(), steps.last()) else {
+        return Dual::constant(0.0);
+    };
+    if at.value <= first.0 {
+        return first.1;
+    }
+    if at.value >= last.0 {
+        return last.1;
+    }
+    let after = steps.partition_point(|s| s.0 <= at.value);
+    let from = after.saturating_sub(2).min(steps.len().saturating_sub(4));
+    let near = &steps[from..(from + 4).min(steps.len())];
+    let mut sum = Dual::constant(0.0);
+    let mut rate = 0.0;
+    for (i, a) in near.iter().enumerate() {
+        let others = || {
+            near.iter()
+                .enumerate()
+                .filter(move |&(j, b)| j != i && b.0 != a.0)
+                .map(|(_, b)| b.0)
+        };
+        let weight: f64 = others().map(|b| (at.value - b) / (a.0 - b)).product();
+        let below: f64 = others().map(|b| a.0 - b).product();
+        let slope: f64 = others()
+            .enumerate()
+            .map(|(skip, _)| {
+                others()
+                    .enumerate()
+                    .filter(|&(j, _)| j != skip)
+                    .map(|(_, b)| at.value - b)
+                    .product::<f64>()
+            })
+            .sum();
+        sum = sum.plus(weight, &a.1);
+        rate += slope / below * a.1.value;
+    }
+    for (s, a) in sum.slope.iter_mut().zip(&at.slope) {
+        *s += rate * a;
+    }
+    sum
+}

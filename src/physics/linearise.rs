@@ -1,0 +1,124 @@
+//! A plant linearised at a point.
+
+use nalgebra::DMatrix;
+
+use super::dual::Dual;
+use super::field::LANES;
+use super::simulate::{Plant, Point};
+use super::tape::{Frame, Tape};
+
+/// `dx/dt = A dx + B du`, `dy = C dx + D du` about a point, in continuous time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearPlant {
+    /// States by states.
+    pub a: DMatrix<f64>,
+    /// States by inputs.
+    pub b: DMatrix<f64>,
+    /// Outputs by states.
+    pub c: DMatrix<f64>,
+    /// Outputs by inputs.
+    pub d: DMatrix<f64>,
+    /// Derivatives of the states at the point: 0 at an equilibrium.
+    pub derivative: Vec<f64>,
+    /// Outputs at the point.
+    pub output: Vec<f64>,
+}
+
+impl LinearPlant {
+    /// `A` and `B` of the system sampled every `sample_time` with its inputs held.
+    pub fn discrete(&self, sample_time: f64) -> (DMatrix<f64>, DMatrix<f64>) {
+        let (n, m) = (self.a.nrows(), self.b.ncols());
+        let mut both = DMatrix::zeros(n + m, n + m);
+        both.view_mut((0, 0), (n, n))
+            .copy_from(&(&self.a * sample_time));
+        both.view_mut((0, n), (n, m))
+            .copy_from(&(&self.b * sample_time));
+        let e = both.exp();
+        (
+            e.view((0, 0), (n, n)).into_owned(),
+            e.view((0, n), (n, m)).into_owned(),
+        )
+    }
+}
+
+impl Plant {
+    /// Linearises at a state, inputs and a time; what is delayed has the value that it has now.
+    pub fn linearise(
+        &self,
+        point: &Point,
+        state: &[f64],
+        inputs: &[f64],
+        time: f64,
+    ) -> LinearPlant {
+        let tape = Tape::with_active_inputs(&self.spec);
+        let (n, m, l) = (tape.states.len(), tape.inputs.len(), tape.outputs.len());
+        let mut whole = DMatrix::zeros(n + l, n + m);
+        let mut frame: Frame<LANES> = tape.frame();
+        for (&slot, &value) in tape.parameters.iter().zip(&point.parameters) {
+            frame.slot[slot] = Dual::constant(value);
+        }
+        tape.run_parameters(&mut frame);
+        frame.slot[tape.time] = Dual::constant(time);
+        let sources: Vec<(usize, f64)> = tape
+            .states
+            .iter()
+            .zip(state)
+            .chain(tape.inputs.iter().zip(inputs))
+            .map(|(&slot, &value)| (slot, value))
+            .collect();
+        for first in (0..(n + m).max(1)).step_by(LANES) {
+            for (i, &(slot, value)) in sources.iter().enumerate() {
+                frame.slot[slot] = Dual::constant(value);
+                if (first..first + LANES).contains(&i) {
+                    frame.slot[slot].slope[i - first] = 1.0;
+                }
+            }
+            tape.run_inputs(&mut frame);
+            // A delayed value is found by the sweep itself; as many sweeps as there are delays settle a chain of them.
+            for _ in 0..=tape.delays.len() {
+                tape.run_states(&mut frame);
+                for delay in &tape.delays {
+                    frame.slot[delay.result] = frame.slot[delay.value];
+                }
+            }
+            for (row, &slot) in tape.derivatives.iter().chain(&tape.outputs).enumerate() {
+                for column in first..(first + LANES).min(n + m) {
+                    whole[(row, column)] = frame.slot[slot].slope[column - first];
+                }
+            }
+        }
+        LinearPlant {
+            a: whole.view((0, 0), (n, n)).into_owned(),
+            b: whole.view((0, n), (n, m)).into_owned(),
+            c: whole.view((n, 0), (l, n)).into_owned(),
+            d: whole.view((n, n), (l, m)).into_owned(),
+            derivative: tape
+                .derivatives
+                .iter()
+                .map(|&s| frame.slot[s].value)
+                .collect(),
+            output: tape.outputs.iter().map(|&s| frame.slot[s].value).collect(),
+        }
+    }
+
+    /// A state at which nothing moves with these inputs, found by Newton's method from `state`; none when there is none nearby.
+    pub fn equilibrium(&self, point: &Point, state: &[f64], inputs: &[f64]) -> Option<Vec<f64>> {
+        const STEPS: usize = 50;
+        let mut x = state.to_vec();
+        for _ in 0..STEPS {
+            let linear = self.linearise(point, &x, inputs, 0.0);
+            let size = x.iter().map(|x| x.abs()).fold(1.0, f64::max);
+            let right = nalgebra::DVector::from_vec(linear.derivative.clone());
+            let step = linear.a.svd(true, true).solve(&right, 1e-12).ok()?;
+            if !step.iter().all(|s| s.is_finite()) {
+                return None;
+            }
+            x.iter_mut().zip(step.iter()).for_each(|(x, s)| *x -= s);
+            if step.amax() <= 1e-12 * size {
+                let left = self.linearise(point, &x, inputs, 0.0).derivative;
+                return left.iter().all(|d| d.abs() <= 1e-8 * size).then_some(x);
+            }
+        }
+        None
+    }
+}

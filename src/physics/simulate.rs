@@ -1,0 +1,508 @@
+//! Simulation of a plant with sensitivities.
+//!
+//! A run without slopes chooses the steps within each sample. Slopes ([`Plant::sensitivities`]) are those of the same steps, so
+//! that they are the derivatives of what [`Plant::simulate`] computes.
+
+use nalgebra::DMatrix;
+
+use super::choose::{Chooser, STEP_ACCURACY};
+use super::dual::Dual;
+use super::expression::{ExpressionId, Node};
+use super::field::Field;
+use super::spec::ModelSpec;
+use super::step::Stages;
+use super::tape::Tape;
+use super::walk::{IMPLICIT, Walk};
+
+/// How inputs behave between samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Hold {
+    /// Constant until the next sample.
+    #[default]
+    Zero,
+    /// On a straight line to the next sample.
+    Linear,
+}
+
+/// Inputs of a run.
+#[derive(Debug, Clone, Copy)]
+pub struct Excitation<'a> {
+    /// A column for each input, in the order of declaration.
+    pub inputs: &'a [&'a [f64]],
+    /// Number of samples: that of each column, and needed where a plant has no input.
+    pub length: usize,
+    /// Seconds from sample to sample.
+    pub sample_time: f64,
+    /// Time of the first sample.
+    pub start_time: f64,
+    /// Between samples.
+    pub hold: Hold,
+}
+
+impl Excitation<'_> {
+    pub(super) fn samples(&self) -> usize {
+        self.length
+    }
+
+    pub(super) fn time(&self, sample: usize) -> f64 {
+        self.start_time + sample as f64 * self.sample_time
+    }
+
+    /// Where in a sample an instant lies, from 0 to 1.
+    pub(super) fn fraction(&self, sample: usize, time: f64) -> f64 {
+        ((time - self.time(sample)) / self.sample_time).clamp(0.0, 1.0)
+    }
+
+    /// Value of a series at `at`, which lies in `sample`.
+    pub(super) fn between<const M: usize>(
+        &self,
+        series: &[Dual<M>],
+        sample: usize,
+        at: &Dual<M>,
+    ) -> Dual<M> {
+        let last = series.len() - 1;
+        let (a, b) = (series[sample.min(last)], series[(sample + 1).min(last)]);
+        if self.hold == Hold::Zero || at.value <= self.start_time {
+            return a;
+        }
+        let part = self.fraction(sample, at.value);
+        let mut value = Dual::constant(0.0).plus(1.0 - part, &a).plus(part, &b);
+        for (s, t) in value.slope.iter_mut().zip(&at.slope) {
+            *s += (b.value - a.value) / self.sample_time * t;
+        }
+        value
+    }
+}
+
+/// Values of what may be estimated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    /// One for each parameter, in the order of [`ModelSpec::parameters`].
+    pub parameters: Vec<f64>,
+    /// One for each state; `None` takes the start value of the text.
+    pub start: Vec<Option<f64>>,
+}
+
+/// What outputs are differentiated by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// A parameter, by its place in [`ModelSpec::parameters`].
+    Parameter(usize),
+    /// The initial value of a state, by its place in [`ModelSpec::states`].
+    Start(usize),
+    /// An element of the observer's gain: state and output.
+    Gain(usize, usize),
+}
+
+/// An observer: after each sample the states are corrected by `gain` times the difference of recording and output.
+#[derive(Debug, Clone, Copy)]
+pub struct Observer<'a> {
+    /// Rows of states, columns of outputs.
+    pub gain: &'a DMatrix<f64>,
+    /// A column for each output.
+    pub recorded: &'a [&'a [f64]],
+}
+
+/// The steps of a run, and the ramps of its switches.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Plan {
+    pub(super) steps: Vec<u8>,
+    pub(super) widths: Vec<f64>,
+}
+
+impl Plan {
+    /// Number of steps.
+    pub fn steps(&self) -> usize {
+        self.steps.len()
+    }
+
+    /// Number of implicit steps.
+    pub fn implicit_steps(&self) -> usize {
+        self.steps.iter().filter(|&&s| s & IMPLICIT != 0).count()
+    }
+}
+
+/// The answer of a plant.
+#[derive(Debug, Clone)]
+pub struct Trajectory {
+    /// A column for each output.
+    pub outputs: Vec<Vec<f64>>,
+    /// A column for each state.
+    pub states: Vec<Vec<f64>>,
+    /// The steps it was computed in.
+    pub plan: Plan,
+}
+
+/// Why a plant cannot be simulated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulationError {
+    /// An expression has no value.
+    #[error(
+        "at t = {time:.6} s `{expression}` (line {line}) is not a number{}",
+        said(values)
+    )]
+    NotANumber {
+        /// When.
+        time: f64,
+        /// As written.
+        expression: String,
+        /// Line of the text.
+        line: usize,
+        /// Names and values of the variables in it.
+        values: Vec<(String, f64)>,
+    },
+    /// A state leaves every bound.
+    #[error(
+        "at t = {time:.6} s the state `{state}` reaches {value:e}: the plant is unstable from this start with these parameters"
+    )]
+    Diverged {
+        /// When.
+        time: f64,
+        /// Name.
+        state: String,
+        /// Its value.
+        value: f64,
+    },
+    /// The excitation is not that of the plant.
+    #[error(
+        "the plant has {expected} inputs of {length} samples each; {found} columns were given, or columns of another length"
+    )]
+    Inputs {
+        /// Number of inputs of the plant.
+        expected: usize,
+        /// Number of samples.
+        length: usize,
+        /// Number of columns.
+        found: usize,
+    },
+}
+
+fn said(values: &[(String, f64)]) -> String {
+    if values.is_empty() {
+        return String::new();
+    }
+    let list: Vec<String> = values
+        .iter()
+        .map(|(n, v)| format!("{n} = {v:.6e}"))
+        .collect();
+    format!("; there {}", list.join(", "))
+}
+
+/// A plant that can be simulated.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    /// Its equations.
+    pub spec: ModelSpec,
+    pub(super) tape: Tape,
+}
+
+impl Plant {
+    /// Compiles the equations.
+    pub fn new(spec: ModelSpec) -> Self {
+        let tape = Tape::new(&spec);
+        Self { spec, tape }
+    }
+
+    /// Values of the text: those of parameters, and no start value of its own.
+    pub fn nominal(&self) -> Point {
+        let mut frame = self.tape.frame::<0>();
+        self.tape.run_parameters(&mut frame);
+        Point {
+            parameters: self
+                .tape
+                .nominal
+                .iter()
+                .map(|&p| frame.slot[p].value)
+                .collect(),
+            start: vec![None; self.tape.states.len()],
+        }
+    }
+
+    /// Number of instructions of an evaluation.
+    pub fn instructions(&self) -> usize {
+        self.tape.len()
+    }
+
+    /// Initial states at `point`.
+    pub fn start(&self, point: &Point) -> Vec<f64> {
+        let mut frame = self.tape.frame::<0>();
+        for (&slot, &value) in self.tape.parameters.iter().zip(&point.parameters) {
+            frame.slot[slot].value = value;
+        }
+        self.tape.run_parameters(&mut frame);
+        let text = self.tape.starts.iter().map(|&s| frame.slot[s].value);
+        text.zip(&point.start)
+            .map(|(t, own)| own.unwrap_or(t))
+            .collect()
+    }
+
+    /// The free run, or, with an observer, the one-step predictions.
+    ///
+    /// # Errors
+    /// When an expression has no value, a state diverges, or the inputs are not those of the plant.
+    pub fn simulate(
+        &self,
+        point: &Point,
+        excitation: &Excitation,
+        observer: Option<&Observer>,
+    ) -> Result<Trajectory, SimulationError> {
+        let moving = self.tape.switches.iter().any(|s| s.moves);
+        if !moving {
+            return self.simulate_with(point, excitation, observer, &[]);
+        }
+        // A first run only finds how large the arguments of switches become.
+        let rough = self.run_choosing(point, excitation, observer, None)?;
+        self.simulate_with(point, excitation, observer, &rough.plan.widths)
+    }
+
+    /// As [`simulate`](Self::simulate) with the ramps of an earlier run: the answer is then smooth in the parameters.
+    ///
+    /// # Errors
+    /// As `simulate`.
+    pub fn simulate_as(
+        &self,
+        point: &Point,
+        excitation: &Excitation,
+        observer: Option<&Observer>,
+        plan: &Plan,
+    ) -> Result<Trajectory, SimulationError> {
+        self.simulate_with(point, excitation, observer, &plan.widths)
+    }
+
+    fn simulate_with(
+        &self,
+        point: &Point,
+        excitation: &Excitation,
+        observer: Option<&Observer>,
+        widths: &[f64],
+    ) -> Result<Trajectory, SimulationError> {
+        self.run_choosing(point, excitation, observer, Some(widths))
+    }
+
+    fn check(&self, excitation: &Excitation) -> Result<(), SimulationError> {
+        let expected = self.tape.inputs.len();
+        let sound = excitation.inputs.len() == expected
+            && excitation
+                .inputs
+                .iter()
+                .all(|c| c.len() == excitation.length)
+            && excitation.length > 0;
+        if sound {
+            return Ok(());
+        }
+        Err(SimulationError::Inputs {
+            expected,
+            length: excitation.length,
+            found: excitation.inputs.len(),
+        })
+    }
+
+    fn walk<'a, const M: usize>(
+        &'a self,
+        point: &Point,
+        excitation: &'a Excitation<'a>,
+        widths: &[f64],
+        directions: &[Direction],
+    ) -> Walk<'a, M> {
+        let mut frame = self.tape.frame::<M>();
+        for (width, &known) in frame.width.iter_mut().zip(widths) {
+            *width = known;
+        }
+        for (i, (&slot, &value)) in self
+            .tape
+            .parameters
+            .iter()
+            .zip(&point.parameters)
+            .enumerate()
+        {
+            frame.slot[slot] = Dual::constant(value);
+            if let Some(lane) = directions
+                .iter()
+                .position(|&d| d == Direction::Parameter(i))
+            {
+                frame.slot[slot].slope[lane] = 1.0;
+            }
+        }
+        let field = Field::new(&self.tape, frame, excitation);
+        let x: Vec<Dual<M>> = (0..self.tape.states.len())
+            .map(|i| {
+                let text = field.frame.slot[self.tape.starts[i]];
+                let mut x = point.start[i].map_or(text, Dual::constant);
+                if let Some(lane) = directions.iter().position(|&d| d == Direction::Start(i)) {
+                    x = Dual::constant(x.value);
+                    x.slope[lane] = 1.0;
+                }
+                x
+            })
+            .collect();
+        let room = vec![Dual::constant(0.0); x.len()];
+        Walk {
+            field,
+            stages: Stages::new(x.len()),
+            first: room.clone(),
+            next: room,
+            x,
+        }
+    }
+
+    fn run_choosing(
+        &self,
+        point: &Point,
+        excitation: &Excitation,
+        observer: Option<&Observer>,
+        widths: Option<&[f64]>,
+    ) -> Result<Trajectory, SimulationError> {
+        self.check(excitation)?;
+        let mut walk = self.walk::<0>(point, excitation, widths.unwrap_or(&[]), &[]);
+        let mut chooser = Chooser::new(self, &walk, widths.is_none());
+        let column = || Vec::with_capacity(excitation.length);
+        let mut outputs: Vec<Vec<f64>> = self.tape.outputs.iter().map(|_| column()).collect();
+        let mut states: Vec<Vec<f64>> = self.tape.states.iter().map(|_| column()).collect();
+        for k in 0..excitation.length {
+            walk.sample(k, excitation);
+            for (column, x) in states.iter_mut().zip(&walk.x) {
+                column.push(x.value);
+            }
+            for (column, &slot) in outputs.iter_mut().zip(&self.tape.outputs) {
+                column.push(walk.field.frame.slot[slot].value);
+            }
+            if let Some(at) = outputs.iter().position(|o| !o[k].is_finite()) {
+                return Err(self
+                    .not_a_number(&walk, excitation.time(k))
+                    .unwrap_or_else(|| self.diverged(&walk, excitation.time(k), at)));
+            }
+            walk.correct(k, excitation, observer, &self.tape.outputs, &[]);
+            if k + 1 < excitation.length {
+                chooser.advance(&mut walk, k, excitation)?;
+            }
+        }
+        Ok(Trajectory {
+            outputs,
+            states,
+            plan: chooser.plan(&self.tape),
+        })
+    }
+
+    pub(super) fn diverged<const M: usize>(
+        &self,
+        walk: &Walk<M>,
+        time: f64,
+        state: usize,
+    ) -> SimulationError {
+        let states = self.spec.states();
+        let name = states
+            .get(state)
+            .map_or("output", |&v| &self.spec.variable(v).name);
+        SimulationError::Diverged {
+            time,
+            state: name.to_owned(),
+            value: walk.x.get(state).map_or(f64::NAN, |x| x.value),
+        }
+    }
+
+    /// What in the frame has no value although its operands have one.
+    pub(super) fn not_a_number<const M: usize>(
+        &self,
+        walk: &Walk<M>,
+        time: f64,
+    ) -> Option<SimulationError> {
+        let at = self.tape.culprit(&walk.field.frame)?;
+        let mut values = Vec::new();
+        let mut stack: Vec<ExpressionId> = vec![at];
+        while let Some(id) = stack.pop() {
+            let node = self.spec.expressions.node(id);
+            if let Node::Variable(v) = node {
+                let name = &self.spec.variable(v).name;
+                if values.len() < 6 && !values.iter().any(|(n, _)| n == name) {
+                    values.push((
+                        name.clone(),
+                        walk.field.frame.slot[self.tape.variables[v.index()]].value,
+                    ));
+                }
+            }
+            if stack.len() < 1000 {
+                stack.extend(node.operands());
+            }
+        }
+        let span = self.spec.expressions.span(at);
+        let text = &self.spec.text;
+        Some(SimulationError::NotANumber {
+            time,
+            expression: text
+                .get(span.start..span.end)
+                .unwrap_or("an expression")
+                .to_owned(),
+            line: 1 + text
+                .get(..span.start)
+                .map_or(0, |t| t.matches('\n').count()),
+            values,
+        })
+    }
+
+    /// Derivatives of the outputs along a run: for each output a column for each direction.
+    pub fn sensitivities(
+        &self,
+        point: &Point,
+        excitation: &Excitation,
+        observer: Option<&Observer>,
+        plan: &Plan,
+        directions: &[Direction],
+    ) -> Vec<Vec<Vec<f64>>> {
+        let mut columns: Vec<Vec<Vec<f64>>> = vec![Vec::new(); self.tape.outputs.len()];
+        let mut rest = directions;
+        while !rest.is_empty() {
+            let (now, later) = rest.split_at(rest.len().min(16));
+            let part = match now.len() {
+                1 => self.replay::<1>(point, excitation, observer, plan, now),
+                2 => self.replay::<2>(point, excitation, observer, plan, now),
+                3 | 4 => self.replay::<4>(point, excitation, observer, plan, now),
+                5 | 6 => self.replay::<6>(point, excitation, observer, plan, now),
+                7 | 8 => self.replay::<8>(point, excitation, observer, plan, now),
+                9 | 10 => self.replay::<10>(point, excitation, observer, plan, now),
+                11 | 12 => self.replay::<12>(point, excitation, observer, plan, now),
+                _ => self.replay::<16>(point, excitation, observer, plan, now),
+            };
+            for (all, part) in columns.iter_mut().zip(part) {
+                all.extend(part);
+            }
+            rest = later;
+        }
+        columns
+    }
+
+    fn replay<const M: usize>(
+        &self,
+        point: &Point,
+        excitation: &Excitation,
+        observer: Option<&Observer>,
+        plan: &Plan,
+        directions: &[Direction],
+    ) -> Vec<Vec<Vec<f64>>> {
+        let mut walk = self.walk::<M>(point, excitation, &plan.widths, directions);
+        let mut columns = vec![
+            vec![Vec::with_capacity(excitation.length); directions.len()];
+            self.tape.outputs.len()
+        ];
+        let mut steps = plan.steps.iter().copied();
+        let mut scale: Vec<f64> = walk.x.iter().map(|x| x.value.abs() * 1e-9).collect();
+        for k in 0..excitation.length {
+            walk.sample(k, excitation);
+            for (of_output, &slot) in columns.iter_mut().zip(&self.tape.outputs) {
+                let slope = &walk.field.frame.slot[slot].slope;
+                of_output
+                    .iter_mut()
+                    .zip(slope)
+                    .for_each(|(column, &s)| column.push(s));
+            }
+            walk.correct(k, excitation, observer, &self.tape.outputs, directions);
+            if k + 1 < excitation.length {
+                for (s, x) in scale.iter_mut().zip(&walk.x) {
+                    *s = s.max(x.value.abs() * STEP_ACCURACY).max(f64::MIN_POSITIVE);
+                }
+                walk.replay(k, excitation, &mut steps, &scale);
+            }
+        }
+        columns
+    }
+}

@@ -1,0 +1,527 @@
+//! Equations compiled to a flat tape: one sweep gives values and forward derivatives.
+//!
+//! Each instruction writes the slot behind it, so that the tape is in single-assignment form. Instructions are sorted by what
+//! they depend on: parameters only (once a run), inputs (once a sample while inputs are held), states and time (each
+//! evaluation). A sweep carries `M` derivatives beside each value; what depends on no state and no parameter carries none.
+//!
+//! Discontinuous switches (`sign`, comparisons) are ramps of a width that the caller sets. A ramp that the integrator resolves
+//! makes the derivative of the time of a switch part of the ordinary forward derivative, and sticking an ordinary stiff
+//! equation.
+
+use super::dual::Dual;
+use super::execute::execute;
+use super::expression::{Binary, ExpressionId, Function, Node, VariableId};
+use super::spec::{ModelSpec, Unknown, VariableKind};
+
+/// What an instruction does with its operands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Operation {
+    Negate,
+    Not,
+    Call(Function),
+    Binary(Binary),
+    /// Integer power.
+    PowerInteger(i32),
+    /// `sign(a)` as a ramp; index of the switch.
+    Sign(u32),
+    /// Comparison as a ramp; index of the switch.
+    Switch {
+        index: u32,
+        /// `a < b` instead of `a > b`.
+        less: bool,
+        /// Whether equal operands satisfy it.
+        equal: bool,
+    },
+    /// `if a then b else c`
+    If,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Instruction {
+    pub operation: Operation,
+    pub a: u32,
+    pub b: u32,
+    pub c: u32,
+    /// Whether each operand, and so the result, can have a derivative.
+    pub active: [bool; 3],
+}
+
+/// What a slot depends on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Level {
+    Parameters,
+    Inputs,
+    States,
+}
+
+/// An argument of `delay`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct DelaySlots {
+    /// What is delayed.
+    pub value: usize,
+    /// By how long.
+    pub time: usize,
+    /// Where the delayed value is put.
+    pub result: usize,
+    /// True when what is delayed depends on inputs and parameters only.
+    pub of_inputs: bool,
+}
+
+/// Equations as a flat program.
+#[derive(Debug, Clone)]
+pub(super) struct Tape {
+    instructions: Vec<Instruction>,
+    /// Expression each slot computes, for messages.
+    sources: Vec<Option<ExpressionId>>,
+    /// First instruction of the levels `Inputs` and `States`.
+    bounds: [usize; 2],
+    leaves: usize,
+    literals: Vec<(u32, f64)>,
+    pub time: usize,
+    pub states: Vec<usize>,
+    pub inputs: Vec<usize>,
+    pub parameters: Vec<usize>,
+    /// Slots of derivatives, outputs and start values, in the order of the states, outputs and states.
+    pub derivatives: Vec<usize>,
+    pub outputs: Vec<usize>,
+    pub starts: Vec<usize>,
+    /// Slots of the values that the text gives to the parameters.
+    pub nominal: Vec<usize>,
+    pub delays: Vec<DelaySlots>,
+    /// Slot of every variable.
+    pub variables: Vec<usize>,
+    /// Operand slots of each switch whose argument depends on states or time, and whether it depends on states.
+    pub switches: Vec<SwitchSlots>,
+}
+
+/// A discontinuity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SwitchSlots {
+    pub a: usize,
+    /// None for `sign`.
+    pub b: Option<usize>,
+    /// False when it depends on parameters, inputs or time only.
+    pub of_states: bool,
+    /// True when it changes within a sample.
+    pub moves: bool,
+}
+
+/// Values of all slots with `M` derivatives each.
+#[derive(Debug, Clone)]
+pub(super) struct Frame<const M: usize> {
+    pub slot: Vec<Dual<M>>,
+    /// Half width of the ramp of each switch; 0 is a jump.
+    pub width: Vec<f64>,
+}
+
+impl<const M: usize> Frame<M> {
+    /// Argument of a switch.
+    pub fn switch(&self, s: &SwitchSlots) -> f64 {
+        self.slot[s.a].value - s.b.map_or(0.0, |b| self.slot[b].value)
+    }
+}
+
+/// Collects the tape; see [`Tape::new`].
+struct Builder<'a> {
+    spec: &'a ModelSpec,
+    level: Vec<Level>,
+    active: Vec<bool>,
+    of_states: Vec<bool>,
+    sources: Vec<Option<ExpressionId>>,
+    literals: Vec<(u32, f64)>,
+    instructions: Vec<(u32, Instruction)>,
+    switches: Vec<SwitchSlots>,
+    delays: Vec<DelaySlots>,
+    time: u32,
+    variable: Vec<u32>,
+    derivative: Vec<u32>,
+    of_node: Vec<u32>,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Builder<'_> {
+    fn slot(
+        &mut self,
+        level: Level,
+        active: bool,
+        of_states: bool,
+        source: Option<ExpressionId>,
+    ) -> u32 {
+        self.level.push(level);
+        self.active.push(active);
+        self.of_states.push(of_states);
+        self.sources.push(source);
+        (self.level.len() - 1) as u32
+    }
+
+    fn emit(
+        &mut self,
+        operation: Operation,
+        operands: [u32; 3],
+        source: Option<ExpressionId>,
+    ) -> u32 {
+        let used = operands.iter().filter(|&&o| o != NONE);
+        let level = used
+            .clone()
+            .map(|&o| self.level[o as usize])
+            .max()
+            .unwrap_or(Level::Parameters);
+        let active = operands.map(|o| o != NONE && self.active[o as usize]);
+        let of_states = used.clone().any(|&o| self.of_states[o as usize]);
+        let [a, b, c] = operands.map(|o| if o == NONE { 0 } else { o });
+        let slot = self.slot(level, active.contains(&true), of_states, source);
+        self.instructions.push((
+            slot,
+            Instruction {
+                operation,
+                a,
+                b,
+                c,
+                active,
+            },
+        ));
+        slot
+    }
+
+    fn literal(&mut self, value: f64) -> u32 {
+        let slot = self.slot(Level::Parameters, false, false, None);
+        self.literals.push((slot, value));
+        slot
+    }
+
+    fn switch(&mut self, a: u32, b: u32) -> u32 {
+        let at = |o: u32, of: &[bool]| o != NONE && of[o as usize];
+        let moves = |o: u32, level: &[Level]| o != NONE && level[o as usize] == Level::States;
+        self.switches.push(SwitchSlots {
+            a: a as usize,
+            b: (b != NONE).then_some(b as usize),
+            of_states: at(a, &self.of_states) || at(b, &self.of_states),
+            moves: moves(a, &self.level) || moves(b, &self.level),
+        });
+        (self.switches.len() - 1) as u32
+    }
+
+    /// Slot of an expression. Operands stand before operators in the arena, so that one pass over the nodes that are used
+    /// is enough and no recursion is needed.
+    fn expression(&mut self, root: ExpressionId) -> u32 {
+        let mut stack = vec![root];
+        while let Some(&id) = stack.last() {
+            if self.of_node[id.index()] != NONE {
+                stack.pop();
+                continue;
+            }
+            let node = self.spec.expressions.node(id);
+            let missing: Vec<_> = node
+                .operands()
+                .filter(|o| self.of_node[o.index()] == NONE)
+                .collect();
+            if missing.is_empty() {
+                self.of_node[id.index()] = self.node(id, node);
+                stack.pop();
+            } else {
+                stack.extend(missing);
+            }
+        }
+        self.of_node[root.index()]
+    }
+
+    fn node(&mut self, id: ExpressionId, node: Node) -> u32 {
+        let at = |o: ExpressionId, this: &Self| this.of_node[o.index()];
+        let source = Some(id);
+        match node {
+            Node::Number(value) => self.literal(value),
+            Node::Time => self.time,
+            Node::Variable(v) => self.variable[v.index()],
+            Node::Derivative(v) => self.derivative[v.index()],
+            Node::Negate(a) => self.emit(Operation::Negate, [at(a, self), NONE, NONE], source),
+            Node::Not(a) => self.emit(Operation::Not, [at(a, self), NONE, NONE], source),
+            Node::Call(Function::Sign, a) => {
+                let a = at(a, self);
+                let switch = self.switch(a, NONE);
+                self.emit(Operation::Sign(switch), [a, NONE, NONE], source)
+            }
+            Node::Call(f, a) => self.emit(Operation::Call(f), [at(a, self), NONE, NONE], source),
+            Node::Binary(operator, a, b) => {
+                let (x, y) = (at(a, self), at(b, self));
+                let operation = match operator {
+                    Binary::Greater
+                    | Binary::GreaterOrEqual
+                    | Binary::Less
+                    | Binary::LessOrEqual => Operation::Switch {
+                        index: self.switch(x, y),
+                        less: matches!(operator, Binary::Less | Binary::LessOrEqual),
+                        equal: matches!(operator, Binary::LessOrEqual | Binary::GreaterOrEqual),
+                    },
+                    Binary::Power => match self.spec.expressions.node(b) {
+                        Node::Number(n) if n.fract() == 0.0 && n.abs() <= 16.0 => {
+                            return self.emit(
+                                Operation::PowerInteger(n as i32),
+                                [x, NONE, NONE],
+                                source,
+                            );
+                        }
+                        _ => Operation::Binary(operator),
+                    },
+                    _ => Operation::Binary(operator),
+                };
+                self.emit(operation, [x, y, NONE], source)
+            }
+            Node::If { condition, yes, no } => self.emit(
+                Operation::If,
+                [at(condition, self), at(yes, self), at(no, self)],
+                source,
+            ),
+            Node::Delay { value, time } => {
+                let (value, time) = (at(value, self), at(time, self));
+                let of_inputs = self.level[value as usize] != Level::States;
+                let active = self.active[value as usize] || self.active[time as usize];
+                let of_states = self.of_states[value as usize];
+                let result = self.slot(Level::States, active, of_states, source);
+                self.delays.push(DelaySlots {
+                    value: value as usize,
+                    time: time as usize,
+                    result: result as usize,
+                    of_inputs,
+                });
+                result
+            }
+        }
+    }
+}
+
+impl Tape {
+    /// Compiles the equations of `spec`, in their order.
+    pub fn new(spec: &ModelSpec) -> Self {
+        Self::compile(spec, false)
+    }
+
+    /// The same with slopes by the inputs too.
+    pub fn with_active_inputs(spec: &ModelSpec) -> Self {
+        Self::compile(spec, true)
+    }
+
+    fn compile(spec: &ModelSpec, active_inputs: bool) -> Self {
+        let count = spec.variables.len();
+        let mut build = Builder {
+            spec,
+            level: Vec::new(),
+            active: Vec::new(),
+            of_states: Vec::new(),
+            sources: Vec::new(),
+            literals: Vec::new(),
+            instructions: Vec::new(),
+            switches: Vec::new(),
+            delays: Vec::new(),
+            time: 0,
+            variable: vec![NONE; count],
+            derivative: vec![NONE; count],
+            of_node: vec![NONE; spec.expressions.len()],
+        };
+        // The instants at which a delayed input jumps depend on the delay, which may be estimated.
+        let delayed = spec.expressions.any(|n| matches!(n, Node::Delay { .. }));
+        build.time = build.slot(Level::States, delayed, false, None);
+        for (kind, level) in [
+            (VariableKind::State, Level::States),
+            (VariableKind::Input, Level::Inputs),
+            (VariableKind::Parameter, Level::Parameters),
+        ] {
+            let of_states = kind == VariableKind::State;
+            for v in spec.of_kind(kind) {
+                build.variable[v.index()] = build.slot(
+                    level,
+                    active_inputs || kind != VariableKind::Input,
+                    of_states,
+                    None,
+                );
+            }
+        }
+        for &v in &spec.constants {
+            if let (VariableKind::Constant, Some(value)) =
+                (spec.variable(v).kind, spec.variable(v).value)
+            {
+                build.variable[v.index()] = build.expression(value);
+            }
+        }
+        for equation in &spec.equations {
+            let rest = build.expression(equation.rest);
+            let value = match equation.coefficient {
+                Some(c) => {
+                    let c = build.expression(c);
+                    build.emit(
+                        Operation::Binary(Binary::Divide),
+                        [rest, c, NONE],
+                        Some(equation.right),
+                    )
+                }
+                None => rest,
+            };
+            match equation.unknown {
+                Unknown::Derivative(v) => build.derivative[v.index()] = value,
+                Unknown::Value(v) => build.variable[v.index()] = value,
+            }
+        }
+        let zero = build.literal(0.0);
+        let starts = spec
+            .states()
+            .iter()
+            .map(|&v| spec.variable(v).start.map_or(zero, |e| build.expression(e)))
+            .collect();
+        let nominal = spec
+            .parameters()
+            .iter()
+            .map(|&v| spec.variable(v).value.map_or(zero, |e| build.expression(e)))
+            .collect();
+        build.finish(spec, starts, nominal)
+    }
+
+    /// Instructions of a level, without those of the levels before.
+    fn part(&self, level: Level) -> std::ops::Range<usize> {
+        match level {
+            Level::Parameters => 0..self.bounds[0],
+            Level::Inputs => self.bounds[0]..self.bounds[1],
+            Level::States => self.bounds[1]..self.instructions.len(),
+        }
+    }
+
+    /// A frame with literals set and no derivative.
+    pub fn frame<const M: usize>(&self) -> Frame<M> {
+        let slots = self.leaves + self.instructions.len();
+        let mut frame = Frame {
+            slot: vec![Dual::constant(0.0); slots],
+            width: vec![0.0; self.switches.len()],
+        };
+        for &(slot, value) in &self.literals {
+            frame.slot[slot as usize].value = value;
+        }
+        frame
+    }
+
+    /// What depends on parameters only.
+    pub fn run_parameters<const M: usize>(&self, frame: &mut Frame<M>) {
+        self.run(self.part(Level::Parameters), frame);
+    }
+
+    /// What depends on inputs and parameters only.
+    pub fn run_inputs<const M: usize>(&self, frame: &mut Frame<M>) {
+        self.run(self.part(Level::Inputs), frame);
+    }
+
+    /// All else.
+    pub fn run_states<const M: usize>(&self, frame: &mut Frame<M>) {
+        self.run(self.part(Level::States), frame);
+    }
+
+    /// The first expression that is not finite although its operands are: where a calculation goes wrong.
+    pub fn culprit<const M: usize>(&self, frame: &Frame<M>) -> Option<ExpressionId> {
+        self.instructions.iter().enumerate().find_map(|(i, x)| {
+            let slot = self.leaves + i;
+            let operands = match x.operation {
+                Operation::If => [x.a, x.b, x.c],
+                Operation::Binary(_) | Operation::Switch { .. } => [x.a, x.b, x.a],
+                _ => [x.a; 3],
+            };
+            let sound = operands
+                .iter()
+                .all(|&o| frame.slot[o as usize].value.is_finite());
+            (sound && !frame.slot[slot].value.is_finite())
+                .then_some(self.sources[slot])
+                .flatten()
+        })
+    }
+
+    /// Number of instructions.
+    pub fn len(&self) -> usize {
+        self.instructions.len()
+    }
+
+    fn run<const M: usize>(&self, range: std::ops::Range<usize>, frame: &mut Frame<M>) {
+        let first = self.leaves + range.start;
+        for (i, x) in self.instructions[range].iter().enumerate() {
+            frame.slot[first + i] = execute(x, frame);
+        }
+    }
+}
+
+impl Builder<'_> {
+    /// Renumbers the slots: leaves first, then instructions by level, each level in the order of emission.
+    fn finish(mut self, spec: &ModelSpec, starts: Vec<u32>, nominal: Vec<u32>) -> Tape {
+        let slots = self.level.len();
+        let mut computed = vec![false; slots];
+        self.instructions
+            .iter()
+            .for_each(|&(slot, _)| computed[slot as usize] = true);
+        let mut place = vec![0u32; slots];
+        let leaves: Vec<usize> = (0..slots).filter(|&s| !computed[s]).collect();
+        for (to, &from) in leaves.iter().enumerate() {
+            place[from] = to as u32;
+        }
+        self.instructions
+            .sort_by_key(|(slot, _)| self.level[*slot as usize]);
+        for (i, (slot, _)) in self.instructions.iter().enumerate() {
+            place[*slot as usize] = (leaves.len() + i) as u32;
+        }
+        let count = |level| {
+            self.instructions
+                .iter()
+                .filter(|(s, _)| self.level[*s as usize] <= level)
+                .count()
+        };
+        let bounds = [count(Level::Parameters), count(Level::Inputs)];
+        let mut sources = vec![None; slots];
+        (0..slots).for_each(|s| sources[place[s] as usize] = self.sources[s]);
+        let to = |s: u32| place[s as usize];
+        let at = |s: u32| to(s) as usize;
+        let of = |ids: Vec<VariableId>, from: &[u32]| {
+            ids.iter().map(|v| at(from[v.index()])).collect::<Vec<_>>()
+        };
+        Tape {
+            instructions: self
+                .instructions
+                .iter()
+                .map(|&(_, x)| Instruction {
+                    a: to(x.a),
+                    b: to(x.b),
+                    c: to(x.c),
+                    ..x
+                })
+                .collect(),
+            sources,
+            bounds,
+            leaves: leaves.len(),
+            literals: self.literals.iter().map(|&(s, v)| (to(s), v)).collect(),
+            time: at(self.time),
+            states: of(spec.states(), &self.variable),
+            inputs: of(spec.inputs(), &self.variable),
+            parameters: of(spec.parameters(), &self.variable),
+            derivatives: of(spec.states(), &self.derivative),
+            outputs: of(spec.outputs(), &self.variable),
+            starts: starts.into_iter().map(at).collect(),
+            nominal: nominal.into_iter().map(at).collect(),
+            variables: self
+                .variable
+                .iter()
+                .map(|&s| if s == NONE { usize::MAX } else { at(s) })
+                .collect(),
+            delays: self
+                .delays
+                .iter()
+                .map(|d| DelaySlots {
+                    value: at(d.value as u32),
+                    time: at(d.time as u32),
+                    result: at(d.result as u32),
+                    of_inputs: d.of_inputs,
+                })
+                .collect(),
+            switches: self
+                .switches
+                .iter()
+                .map(|s| SwitchSlots {
+                    a: at(s.a as u32),
+                    b: s.b.map(|b| at(b as u32)),
+                    ..*s
+                })
+                .collect(),
+        }
+    }
+}

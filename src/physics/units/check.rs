@@ -1,0 +1,416 @@
+//! Compares the units of what is added, compared and equated.
+//!
+//! What is not known for certain matches everything: variables without a unit, and numbers that may carry one.
+
+use super::Unit;
+use crate::physics::error::{SpecError, SpecErrorKind, excerpt};
+use crate::physics::expression::{Binary, ExpressionId, Function, Node, Span};
+use crate::physics::spec::ModelSpec;
+use crate::physics::syntax::constant;
+
+/// What is known about the unit of an expression.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Known {
+    /// Nothing.
+    Nothing,
+    /// Made of literals: takes any unit in a sum.
+    Literal {
+        /// The number, where it follows from literals.
+        value: f64,
+        /// True when it is a pure number in a product; another literal may carry a unit, such as 3600 s/h.
+        pure: bool,
+    },
+    /// A unit.
+    Is {
+        unit: Unit,
+        /// A literal is a factor: in the argument of a function it may carry the inverse unit.
+        scaled: bool,
+        /// A fraction times one other factor, as in `tau = 0.5*u`: this is the way to write a gain.
+        gain: bool,
+    },
+}
+
+impl Known {
+    fn is(unit: Unit) -> Self {
+        Self::Is {
+            unit,
+            scaled: false,
+            gain: false,
+        }
+    }
+
+    /// The unit, where it is certain enough to be compared.
+    fn certain(self) -> Option<Unit> {
+        match self {
+            Self::Is {
+                unit, gain: false, ..
+            } => Some(unit),
+            _ => None,
+        }
+    }
+}
+
+/// Compares the units of every sum, difference, comparison, minimum, branch, argument, equation, value and start.
+///
+/// # Errors
+/// The first two parts, in the order of the text, that are of different dimension.
+pub fn check_units(spec: &ModelSpec) -> Result<(), SpecError> {
+    let mut checker = Checker {
+        spec,
+        used: used(spec),
+        known: vec![Known::Nothing; spec.expressions.len()],
+        first: None,
+    };
+    for index in 0..spec.expressions.len() {
+        if checker.used[index] {
+            let id = ExpressionId(index as u32);
+            checker.known[index] = checker.examine(id);
+        }
+    }
+    checker.equations();
+    checker.values();
+    checker.first.map_or(Ok(()), |(at, message)| {
+        let kind = SpecErrorKind::UnitConflict(message);
+        Err(SpecError::new(&spec.text, at, kind))
+    })
+}
+
+/// The nodes that stand in the text, as opposed to those made by solving.
+fn used(spec: &ModelSpec) -> Vec<bool> {
+    let mut used = vec![false; spec.expressions.len()];
+    let sides = spec.equations.iter().flat_map(|e| [e.left, e.right]);
+    let values = spec
+        .variables
+        .iter()
+        .flat_map(|v| [v.value, v.start])
+        .flatten();
+    for root in sides.chain(values) {
+        used[root.index()] = true;
+    }
+    for index in (0..used.len()).rev() {
+        if used[index] {
+            for operand in spec.expressions.node(ExpressionId(index as u32)).operands() {
+                used[operand.index()] = true;
+            }
+        }
+    }
+    used
+}
+
+struct Checker<'a> {
+    spec: &'a ModelSpec,
+    used: Vec<bool>,
+    known: Vec<Known>,
+    /// The conflict that stands first in the text.
+    first: Option<(Span, String)>,
+}
+
+impl Checker<'_> {
+    fn text(&self, id: ExpressionId) -> String {
+        excerpt(&self.spec.text, self.spec.expressions.span(id))
+    }
+
+    /// A unit in the words of the model where they state it.
+    fn unit_text(&self, id: ExpressionId, unit: Unit) -> String {
+        if let Node::Variable(v) = self.spec.expressions.node(id)
+            && let Some(text) = &self.spec.variable(v).unit_text
+        {
+            return crate::physics::error::shortened(text);
+        }
+        unit.to_string()
+    }
+
+    fn conflict(&mut self, at: ExpressionId, message: String) {
+        let span = self.spec.expressions.span(at);
+        if self.first.as_ref().is_none_or(|f| span.start < f.0.start) {
+            self.first = Some((span, message));
+        }
+    }
+
+    fn examine(&mut self, id: ExpressionId) -> Known {
+        let of = |e: ExpressionId| self.known[e.index()];
+        match self.spec.expressions.node(id) {
+            Node::Number(value) => self.number(id, value),
+            Node::Time => Known::Is {
+                unit: Unit::SECOND,
+                // `sin(time)` is meant as `sin(1*time)`.
+                scaled: true,
+                gain: false,
+            },
+            Node::Variable(v) => self.spec.variable(v).unit.map_or(Known::Nothing, Known::is),
+            Node::Derivative(v) => self
+                .spec
+                .variable(v)
+                .unit
+                .map_or(Known::Nothing, |u| Known::is(u.per(&Unit::SECOND))),
+            Node::Negate(a) => match of(a) {
+                Known::Literal { value, pure } => Known::Literal {
+                    value: -value,
+                    pure,
+                },
+                other => other,
+            },
+            Node::Not(_) => Known::Nothing,
+            Node::Call(function, a) => self.call(id, function, a),
+            Node::Binary(operator, a, b) => self.binary(id, operator, a, b),
+            Node::If { yes, no, .. } => self.alike(id, yes, no, "in one branch and", " in another"),
+            Node::Delay { value, .. } => of(value),
+        }
+    }
+
+    fn number(&self, id: ExpressionId, value: f64) -> Known {
+        let span = self.spec.expressions.span(id);
+        let written = self.spec.text.get(span.start..span.end).unwrap_or("");
+        if written.starts_with(|c: char| c.is_ascii_digit()) {
+            return literal(value);
+        }
+        // A constant of the library, perhaps by a name that an import made shorter.
+        let short = written.rsplit('.').next().unwrap_or("");
+        match constant(&format!("Modelica.Constants.{short}")) {
+            Some((_, Some("1"))) => Known::Literal { value, pure: true },
+            Some((_, Some(unit))) => Unit::parse(unit).map_or(Known::Nothing, Known::is),
+            _ => Known::Literal { value, pure: false },
+        }
+    }
+
+    fn call(&mut self, id: ExpressionId, function: Function, a: ExpressionId) -> Known {
+        let argument = self.known[a.index()];
+        match function {
+            Function::Abs => argument,
+            Function::Sign => Known::is(Unit::ONE),
+            Function::Sqrt => power(argument, 0.5),
+            _ => {
+                if let Known::Is {
+                    unit,
+                    scaled: false,
+                    ..
+                } = argument
+                    && !unit.is_one()
+                {
+                    let message = format!(
+                        "`{}`: the argument is {}, and has to be a pure number",
+                        self.text(id),
+                        self.unit_text(a, unit)
+                    );
+                    self.conflict(id, message);
+                }
+                match argument {
+                    Known::Literal { pure, .. } => Known::Literal {
+                        value: f64::NAN,
+                        pure,
+                    },
+                    _ => Known::is(Unit::ONE),
+                }
+            }
+        }
+    }
+
+    fn binary(
+        &mut self,
+        id: ExpressionId,
+        operator: Binary,
+        a: ExpressionId,
+        b: ExpressionId,
+    ) -> Known {
+        let (left, right) = (self.known[a.index()], self.known[b.index()]);
+        match operator {
+            Binary::Add => self.alike(id, a, b, "plus", ""),
+            Binary::Subtract => self.alike(id, a, b, "minus", ""),
+            Binary::Multiply => product(left, right),
+            Binary::Divide => match (left, product(left, power(right, -1.0))) {
+                // A quotient such as `m*v^2/2` is no gain.
+                (Known::Is { gain, .. }, Known::Is { unit, scaled, .. }) => {
+                    Known::Is { unit, scaled, gain }
+                }
+                (_, quotient) => quotient,
+            },
+            Binary::Power => self.raise(id, b, left, right),
+            Binary::Min | Binary::Max => self.alike(id, a, b, "and", ""),
+            Binary::Atan2 => {
+                self.alike(id, a, b, "and", "");
+                Known::is(Unit::ONE)
+            }
+            Binary::And | Binary::Or => Known::Nothing,
+            _ => {
+                self.alike(id, a, b, "compared with", "");
+                Known::Nothing
+            }
+        }
+    }
+
+    /// Two parts that have to be of the same unit: the unit of both.
+    fn alike(
+        &mut self,
+        id: ExpressionId,
+        a: ExpressionId,
+        b: ExpressionId,
+        word: &str,
+        end: &str,
+    ) -> Known {
+        let (left, right) = (self.known[a.index()], self.known[b.index()]);
+        if let (Some(u), Some(v)) = (left.certain(), right.certain())
+            && !u.same(&v)
+        {
+            let message = format!(
+                "`{}`: {} {word} {}{end}",
+                self.text(id),
+                self.unit_text(a, u),
+                self.unit_text(b, v)
+            );
+            self.conflict(id, message);
+            return Known::Nothing;
+        }
+        match (left, right) {
+            (
+                Known::Is { unit, scaled, gain },
+                Known::Is {
+                    unit: other,
+                    scaled: also,
+                    gain: weak,
+                },
+            ) => Known::Is {
+                unit: if gain { other } else { unit },
+                scaled: scaled || also,
+                gain: gain && weak,
+            },
+            (Known::Is { gain: false, .. }, _) => left,
+            (_, Known::Is { gain: false, .. }) => right,
+            (Known::Literal { pure: x, .. }, Known::Literal { pure: y, .. }) => Known::Literal {
+                value: f64::NAN,
+                pure: x && y,
+            },
+            _ => Known::Nothing,
+        }
+    }
+
+    fn raise(&mut self, id: ExpressionId, exponent: ExpressionId, base: Known, by: Known) -> Known {
+        if let Some(unit) = by.certain()
+            && !unit.is_one()
+        {
+            let message = format!(
+                "`{}`: the exponent is {}, and has to be a pure number",
+                self.text(id),
+                self.unit_text(exponent, unit)
+            );
+            self.conflict(id, message);
+            return Known::Nothing;
+        }
+        match (base, by) {
+            (_, Known::Literal { value, .. }) if value.is_finite() => power(base, value),
+            (Known::Is { unit, .. }, _) if unit.is_one() => base,
+            (Known::Literal { pure: true, .. }, _) => Known::is(Unit::ONE),
+            _ => Known::Nothing,
+        }
+    }
+
+    fn equations(&mut self) {
+        for equation in &self.spec.equations {
+            let (mut left, mut right) = (equation.left, equation.right);
+            let start = |id| self.spec.expressions.span(id).start;
+            if start(left) > start(right) {
+                std::mem::swap(&mut left, &mut right);
+            }
+            let units = (
+                self.known[left.index()].certain(),
+                self.known[right.index()].certain(),
+            );
+            if let (Some(u), Some(v)) = units
+                && !u.same(&v)
+            {
+                let message = format!(
+                    "`{}`: {} on the left and {} on the right",
+                    excerpt(&self.spec.text, equation.span),
+                    self.unit_text(left, u),
+                    self.unit_text(right, v)
+                );
+                self.conflict(left, message);
+            }
+        }
+    }
+
+    fn values(&mut self) {
+        for variable in &self.spec.variables {
+            for (what, value) in [("value", variable.value), ("start", variable.start)] {
+                let (Some(declared), Some(value)) = (variable.unit, value) else {
+                    continue;
+                };
+                if let Some(unit) = self.known[value.index()].certain()
+                    && !unit.same(&declared)
+                {
+                    let message = format!(
+                        "`{}`, the {what} of `{}`: {}, and the variable is in {}",
+                        self.text(value),
+                        variable.name,
+                        self.unit_text(value, unit),
+                        variable.unit_text.as_deref().unwrap_or("1")
+                    );
+                    self.conflict(value, message);
+                }
+            }
+        }
+    }
+}
+
+/// A literal is a pure number when it is a small whole number, the half of one, or the inverse of one.
+fn literal(value: f64) -> Known {
+    let size = value.abs();
+    let whole = |v: f64| (v - v.round()).abs() < 1e-12;
+    let pure = size == 0.0
+        || (size <= 10.0 && whole(2.0 * size))
+        || (size < 1.0 && 1.0 / size <= 10.5 && whole(1.0 / size));
+    Known::Literal { value, pure }
+}
+
+fn product(a: Known, b: Known) -> Known {
+    match (a, b) {
+        (Known::Nothing, _) | (_, Known::Nothing) => Known::Nothing,
+        (Known::Literal { value: x, pure: p }, Known::Literal { value: y, pure: q }) => {
+            Known::Literal {
+                value: x * y,
+                pure: (p && q) || matches!(literal(x * y), Known::Literal { pure: true, .. }),
+            }
+        }
+        (Known::Literal { value, pure }, Known::Is { unit, .. })
+        | (Known::Is { unit, .. }, Known::Literal { value, pure }) => {
+            if unit.is_one() {
+                // `0.1*exp(x)` may stand for 0.1 V.
+                let value = f64::NAN;
+                return Known::Literal { value, pure };
+            }
+            if !pure {
+                return Known::Nothing;
+            }
+            let fraction = value.is_finite() && value.fract() != 0.0;
+            Known::Is {
+                unit,
+                scaled: true,
+                gain: fraction,
+            }
+        }
+        (
+            Known::Is { unit, scaled, .. },
+            Known::Is {
+                unit: other,
+                scaled: also,
+                ..
+            },
+        ) => Known::Is {
+            unit: unit.times(&other),
+            scaled: scaled || also,
+            gain: false,
+        },
+    }
+}
+
+fn power(base: Known, exponent: f64) -> Known {
+    match base {
+        Known::Literal { value, pure } => Known::Literal {
+            value: value.powf(exponent),
+            pure,
+        },
+        Known::Is { unit, scaled, gain } => unit
+            .power(exponent)
+            .map_or(Known::Nothing, |unit| Known::Is { unit, scaled, gain }),
+        Known::Nothing => Known::Nothing,
+    }
+}

@@ -1,0 +1,145 @@
+//! A run from sample to sample: inputs, corrections of an observer, and the steps of a plan replayed with slopes.
+
+use super::dual::Dual;
+use super::field::Field;
+use super::simulate::{Direction, Excitation, Observer};
+use super::step::Stages;
+
+/// The finest step is `2^-FINEST` of a sample; a jump is passed with an error of that size.
+pub(super) const FINEST: u8 = 26;
+/// Bit of a step that says that it is implicit.
+pub(super) const IMPLICIT: u8 = 0x80;
+
+/// Where a run stands.
+pub(super) struct Walk<'a, const M: usize> {
+    pub field: Field<'a, M>,
+    pub stages: Stages<M>,
+    pub x: Vec<Dual<M>>,
+    pub first: Vec<Dual<M>>,
+    pub next: Vec<Dual<M>>,
+}
+
+impl<const M: usize> Walk<'_, M> {
+    /// Takes the inputs of a sample and evaluates it.
+    pub fn sample(&mut self, k: usize, excitation: &Excitation) {
+        self.field.begin(k);
+        self.field.part(0.0);
+        let now = Dual::constant(excitation.time(k));
+        self.field.evaluate(&now, &self.x, &mut self.first);
+        if k == 0 {
+            self.field.remember(now.value);
+        }
+    }
+
+    /// Corrects the states as the observer does, and evaluates again.
+    pub fn correct(
+        &mut self,
+        k: usize,
+        excitation: &Excitation,
+        observer: Option<&Observer>,
+        outputs: &[usize],
+        directions: &[Direction],
+    ) {
+        let Some(observer) = observer else { return };
+        for (j, &slot) in outputs.iter().enumerate() {
+            let y = self.field.frame.slot[slot];
+            let mut error = Dual::constant(0.0).plus(-1.0, &y);
+            error.value += observer.recorded[j][k];
+            if !error.value.is_finite() {
+                continue; // a sample that is missing corrects nothing
+            }
+            for (i, x) in self.x.iter_mut().enumerate() {
+                *x = x.plus(observer.gain[(i, j)], &error);
+                if let Some(lane) = directions.iter().position(|&d| d == Direction::Gain(i, j)) {
+                    x.slope[lane] += error.value;
+                }
+            }
+        }
+        self.field.evaluate(
+            &Dual::constant(excitation.time(k)),
+            &self.x,
+            &mut self.first,
+        );
+    }
+
+    /// Parts of a sample between the jumps of delayed inputs: start and length, in seconds.
+    pub fn parts(&self, k: usize, excitation: &Excitation) -> Vec<(Dual<M>, Dual<M>)> {
+        let h = excitation.sample_time;
+        let boundaries = self.field.boundaries();
+        let origin = Dual::constant(excitation.time(k));
+        let pairs = boundaries.windows(2);
+        pairs
+            .map(|w| {
+                (
+                    origin.plus(h, &w[0]),
+                    Dual::constant(0.0).plus(h, &w[1]).plus(-h, &w[0]),
+                )
+            })
+            .collect()
+    }
+
+    /// Begins a part of a sample.
+    pub fn begin_part(
+        &mut self,
+        start: &Dual<M>,
+        length: &Dual<M>,
+        k: usize,
+        excitation: &Excitation,
+        only: bool,
+    ) {
+        if only && self.field.tape.delays.is_empty() {
+            return; // evaluated with the sample
+        }
+        let middle =
+            (start.value + 0.5 * length.value - excitation.time(k)) / excitation.sample_time;
+        self.field.part(middle);
+        self.field.evaluate(start, &self.x, &mut self.first);
+    }
+
+    pub fn replay(
+        &mut self,
+        k: usize,
+        excitation: &Excitation,
+        steps: &mut impl Iterator<Item = u8>,
+        scale: &[f64],
+    ) {
+        let parts = self.parts(k, excitation);
+        for (start, length) in &parts {
+            self.begin_part(start, length, k, excitation, parts.len() == 1);
+            let mut place = 0u32;
+            while place < 1 << FINEST {
+                let Some(step) = steps.next() else { return };
+                let size = 1u32 << (FINEST - (step & !IMPLICIT));
+                let share = |n: u32| f64::from(n) / f64::from(1u32 << FINEST);
+                let time = start.plus(share(place), length);
+                let part = Dual::constant(0.0).plus(share(size), length);
+                if step & IMPLICIT == 0 {
+                    self.stages.explicit(
+                        &mut self.field,
+                        &time,
+                        &part,
+                        &self.x,
+                        &self.first,
+                        &mut self.next,
+                    );
+                } else {
+                    self.stages.implicit(
+                        &mut self.field,
+                        &time,
+                        &part,
+                        &self.x,
+                        scale,
+                        &mut self.next,
+                    );
+                }
+                std::mem::swap(&mut self.x, &mut self.next);
+                place += size;
+                if place < 1 << FINEST || self.field.remembers() {
+                    let end = start.plus(share(place), length);
+                    self.field.evaluate(&end, &self.x, &mut self.first);
+                    self.field.remember(end.value);
+                }
+            }
+        }
+    }
+}
