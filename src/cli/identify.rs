@@ -9,6 +9,7 @@ use super::model_flags::ModelFlags;
 use super::output::{Output, check_distinct, note, paths, print};
 use super::progress::Progress;
 use super::roles::{RoleFlags, tell_reading};
+use super::structure::{self, StructureFlags};
 use super::terminal::style;
 use super::{Outcome, Verbosity};
 use crate::identify::{IdentifyError, Model, Options, Order, on_files};
@@ -23,6 +24,7 @@ const EXAMPLE: &str = "Examples:
   innovant identify log.csv --report page.html     pictures, in one file that opens offline
   innovant identify first.csv second.csv           two experiments of one plant
   innovant identify log.csv --order 2..8           compare orders
+  innovant identify log.csv --structure plant.mo --output plant.json    parameters of your own equations
   ssh plant cat log.csv | innovant identify - --dt 0.01 --output - | jq .warnings";
 
 /// Identify a state-space model with its uncertainty from recordings
@@ -39,6 +41,8 @@ pub(super) struct Flags {
     roles: RoleFlags,
     #[command(flatten)]
     model: ModelFlags,
+    #[command(flatten)]
+    plant: StructureFlags,
     /// Write the model to this file, as JSON; `-` is standard output (then without the table)
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -77,6 +81,18 @@ impl Plan {
 }
 
 pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
+    if flags.plant.asked() {
+        if flags.report.is_some() {
+            anyhow::bail!("--report draws linear models; leave it out with --structure");
+        }
+        return structure::run(
+            &flags.plant,
+            &flags.logs,
+            &flags.roles,
+            flags.output.as_ref(),
+            say,
+        );
+    }
     let logs: Vec<String> = flags.logs.iter().map(ToString::to_string).collect();
     let plan = Plan::new(flags)?;
     let progress = Progress::over(&plan.sources, say.quiet);

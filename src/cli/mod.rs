@@ -7,12 +7,14 @@
 
 mod align;
 mod batch;
+mod check;
 mod completions;
 mod explain;
 mod identify;
 mod model_flags;
 mod numbers;
 mod output;
+mod plant;
 mod progress;
 mod reproduce;
 mod resources;
@@ -20,6 +22,8 @@ mod roles;
 mod schema;
 mod show;
 mod simulate;
+mod simulate_plant;
+mod structure;
 mod terminal;
 mod validate;
 
@@ -43,6 +47,7 @@ const EXAMPLE: &str = "Example:
   innovant explain log.csv --simulation sim.csv    what did the simulation leave out?
   innovant simulate model.json input.csv > out.csv
   innovant show model.json
+  innovant identify log.csv --structure plant.mo   parameters of your own equations
   innovant batch logs/*.csv --output-dir models     a model of each of many logs
   innovant reproduce all                           the papers' tables and figures, run again
 
@@ -77,6 +82,7 @@ enum Command {
     Explain(explain::Flags),
     Validate(validate::Flags),
     Simulate(simulate::Flags),
+    Check(check::Flags),
     Show(show::Flags),
     Reproduce(reproduce::Flags),
     Schema(schema::Flags),
@@ -129,6 +135,7 @@ fn dispatch(cli: Cli) -> anyhow::Result<Outcome> {
         Some(Command::Explain(flags)) => explain::run(flags, say),
         Some(Command::Validate(flags)) => validate::run(flags, say),
         Some(Command::Simulate(flags)) => simulate::run(flags, say),
+        Some(Command::Check(flags)) => check::run(&flags),
         Some(Command::Show(flags)) => show::run(flags),
         Some(Command::Reproduce(flags)) => reproduce::run(flags, say),
         Some(Command::Schema(flags)) => schema::run(&flags),

@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 
 use super::Outcome;
 use super::output::print;
-use crate::report::{explanation_schema, model_schema, reproduction_schema};
+use crate::report::{explanation_schema, model_schema, plant_schema, reproduction_schema};
 
 const EXAMPLE: &str = "Example:
   innovant schema model > innovant-model-1.schema.json";
@@ -23,6 +23,8 @@ enum Document {
     Model,
     /// innovant-explanation/1, what `innovant explain --output` writes
     Explanation,
+    /// innovant-plant/1, what `innovant identify --structure` writes
+    Plant,
     /// innovant-reproduction/1, what `innovant reproduce` writes
     Reproduction,
 }
@@ -31,6 +33,7 @@ pub(super) fn run(flags: &Flags) -> anyhow::Result<Outcome> {
     match flags.document {
         Document::Model => print(&model_schema()?)?,
         Document::Explanation => print(&explanation_schema()?)?,
+        Document::Plant => print(&plant_schema()?)?,
         Document::Reproduction => print(&reproduction_schema()?)?,
     }
     Ok(Outcome::Done)

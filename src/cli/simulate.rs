@@ -2,11 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use nalgebra::DVector;
 
 use super::output::{Output, check_distinct, note, paths};
+use super::plant::is_plant_file;
 use super::roles::{RoleFlags, tell_reading};
+use super::simulate_plant::{self, PlantRun, Start};
+use super::structure::HoldFlag;
 use super::validate::check_sampling;
 use super::{Outcome, Verbosity};
 use crate::explain::Explanation;
@@ -18,7 +21,8 @@ use crate::report::{is_explanation, parse_explanation, read_model};
 
 const EXAMPLE: &str = "Examples:
   innovant simulate model.json input.csv > output.csv
-  innovant simulate model.json log.csv --initial-state estimate --output output.csv.gz";
+  innovant simulate model.json log.csv --initial-state estimate --output output.csv.gz
+  innovant simulate plant.mo input.csv --parameters J=0.02 --output output.csv";
 
 /// Simulate a model on an input, in the units of the recording
 ///
@@ -28,7 +32,7 @@ const EXAMPLE: &str = "Examples:
 #[command(after_help = EXAMPLE)]
 pub(super) struct Flags {
     /// Model, as `innovant identify --output` or `innovant explain --output` writes it, or
-    /// {"A":..,"B":..,"C":..,"dt":..}
+    /// {"A":..,"B":..,"C":..,"dt":..}, or a plant in equations (.mo)
     #[arg(value_name = "MODEL")]
     model: PathBuf,
     /// Input: CSV, also gzipped; `-` is standard input
@@ -37,9 +41,16 @@ pub(super) struct Flags {
     #[command(flatten)]
     roles: RoleFlags,
     /// State at the first sample: zero is the operating point; estimate takes the one that fits the recorded outputs
-    /// best, which the input file must then hold too
-    #[arg(long, value_enum, default_value = "zero")]
-    initial_state: InitialState,
+    /// best, which the input file must then hold too; for a plant in equations also start (the start values of its text) or
+    /// values by name, as `w=3,phi=0.1` [default: zero; for a plant in equations start]
+    #[arg(long, value_name = "zero|estimate|start|NAME=VALUE")]
+    initial_state: Option<String>,
+    /// Parameters of a plant in equations: `J=0.02,d=0.1`, or a file that `innovant identify --structure` wrote
+    #[arg(long, value_name = "NAME=VALUE|FILE")]
+    parameters: Option<String>,
+    /// Inputs of a plant in equations between samples [default: zero]
+    #[arg(long, value_enum)]
+    hold: Option<HoldFlag>,
     /// Answer of the original simulator to this input, for an explanation relative to a simulator that is not linear
     #[arg(long, value_name = "FILE")]
     simulation: Option<PathBuf>,
@@ -48,10 +59,27 @@ pub(super) struct Flags {
     output: PathBuf,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum InitialState {
-    Zero,
-    Estimate,
+impl Flags {
+    /// Whether the initial state of a linear model is to be estimated.
+    fn estimate(&self) -> anyhow::Result<bool> {
+        match self.initial_state.as_deref() {
+            None | Some("zero") => Ok(false),
+            Some("estimate") => Ok(true),
+            Some(other) => anyhow::bail!(
+                "--initial-state: `{other}` is for plants in equations; a linear model starts from zero or estimate"
+            ),
+        }
+    }
+
+    /// Where a plant in equations starts.
+    fn start(&self) -> Start {
+        match self.initial_state.as_deref() {
+            None | Some("start") => Start::Text,
+            Some("zero") => Start::Zero,
+            Some("estimate") => Start::Estimate,
+            Some(given) => Start::Given(given.to_owned()),
+        }
+    }
 }
 
 pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
@@ -60,6 +88,25 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     check_distinct(&sources)?;
     let output = Output::check(&flags.output, &paths(&sources))?;
     let name = flags.model.display().to_string();
+    if is_plant_file(&flags.model) {
+        return simulate_plant::run(
+            &PlantRun {
+                plant: &flags.model,
+                input: &flags.input,
+                roles: &flags.roles,
+                parameters: flags.parameters.as_deref(),
+                start: flags.start(),
+                hold: flags.hold.map(Into::into),
+                output: output.path(),
+            },
+            say,
+        );
+    }
+    if flags.parameters.is_some() || flags.hold.is_some() {
+        anyhow::bail!(
+            "{name}: --parameters and --hold belong to a plant in equations (a .mo text), and this is none"
+        );
+    }
     if let Some(explanation) = explanation(&flags.model)? {
         return simulate_explanation(flags, &output, &explanation, say);
     }
@@ -72,8 +119,8 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     if model.inputs.is_empty() {
         anyhow::bail!("{name}: this model has no inputs, so there is nothing to simulate");
     }
+    let estimate = flags.estimate()?;
     let roles = flags.roles.of_model(&model.inputs, &model.outputs)?;
-    let estimate = flags.initial_state == InitialState::Estimate;
     let need = if estimate {
         RoleNeed::InputsAndMaybeOutputs
     } else {
@@ -151,8 +198,8 @@ fn simulate_explanation(
     };
     let inputs: Vec<IdentifiedChannel> = model.inputs.iter().map(channel).collect();
     let outputs: Vec<IdentifiedChannel> = model.outputs.iter().map(channel).collect();
+    let estimate = flags.estimate()?;
     let roles = flags.roles.of_model(&inputs, &outputs)?;
-    let estimate = flags.initial_state == InitialState::Estimate;
     let need = if estimate {
         RoleNeed::InputsAndMaybeOutputs
     } else {

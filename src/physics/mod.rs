@@ -12,6 +12,7 @@ mod execute;
 mod expression;
 mod field;
 mod linearise;
+mod modelica;
 mod simulate;
 mod sort;
 mod spec;

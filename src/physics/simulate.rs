@@ -195,13 +195,19 @@ pub struct Plant {
     /// Its equations.
     pub spec: ModelSpec,
     pub(super) tape: Tape,
+    /// Values of the parameters, where they are not those of the text.
+    nominal: Option<Vec<f64>>,
 }
 
 impl Plant {
     /// Compiles the equations.
     pub fn new(spec: ModelSpec) -> Self {
         let tape = Tape::new(&spec);
-        Self { spec, tape }
+        Self {
+            spec,
+            tape,
+            nominal: None,
+        }
     }
 
     /// Values of the text: those of parameters, and no start value of its own.
@@ -217,6 +223,13 @@ impl Plant {
                 .collect(),
             start: vec![None; self.tape.states.len()],
         }
+    }
+
+    /// The plant with these values of its parameters in the text.
+    pub fn with_values(&self, parameters: &[f64]) -> Self {
+        let mut changed = self.clone();
+        changed.nominal = Some(parameters.to_vec());
+        changed
     }
 
     /// Number of instructions of an evaluation.

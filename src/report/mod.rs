@@ -10,6 +10,7 @@
 //! | `text`           | tables for a terminal                                             |
 //! | `page`           | pages of identifications, explanations and reproductions          |
 //! | `overview`       | envelopes and spectra of a recording, gathered while it is read   |
+//! | `plant_document` | the keys of `innovant-plant/1`                                    |
 //! | `reproduction_csv` | all numbers of a reproduction as one long table                 |
 //!
 //! # The same input gives the same bytes
@@ -29,6 +30,7 @@ mod model_document;
 mod overview;
 mod packed;
 mod page;
+mod plant_document;
 mod read;
 mod read_explanation;
 mod reproduction_csv;
@@ -50,8 +52,9 @@ pub use page::PageError;
 pub use page::explanation::explanation_page;
 pub use page::identification::identification_page;
 pub use page::reproduction::reproduction_page;
+pub use plant_document::{FitDocument, PLANT_FORMAT, PlantDocument, is_plant};
 pub use read::{ReadModel, parse_model, read_model};
 pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
 pub use reproduction_csv::reproduction_csv;
 pub use request::Request;
-pub use schema::{explanation_schema, model_schema, reproduction_schema};
+pub use schema::{explanation_schema, model_schema, plant_schema, reproduction_schema};

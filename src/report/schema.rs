@@ -30,6 +30,18 @@ pub fn explanation_schema() -> Result<String, DocumentError> {
     Ok(to_json(&schema)?)
 }
 
+/// The JSON Schema (draft 2020-12) of `innovant-plant/1` as it is written.
+///
+/// # Errors
+/// [`DocumentError::Json`], which should not happen.
+pub fn plant_schema() -> Result<String, DocumentError> {
+    let schema = SchemaSettings::draft2020_12()
+        .for_serialize()
+        .into_generator()
+        .into_root_schema_for::<super::PlantDocument>();
+    Ok(to_json(&schema)?)
+}
+
 /// The JSON Schema (draft 2020-12) of `innovant-reproduction/1` as it is written.
 ///
 /// # Errors

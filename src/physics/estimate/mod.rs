@@ -6,6 +6,7 @@
 //! Schwarz's criterion, is taken. Both are prediction error methods (L. Ljung, *System Identification*, 2nd ed., chapters 7
 //! and 9), which hold under feedback as long as the noise model does.
 
+mod adequacy;
 mod determined;
 mod deviance;
 mod observer;
@@ -13,6 +14,7 @@ mod optimise;
 mod problem;
 mod profile;
 
+pub use adequacy::{Question, ResidualTest};
 pub use determined::Undetermined;
 pub use problem::{EstimateError, PlantRecording};
 
@@ -92,6 +94,8 @@ pub struct PlantEstimate {
     pub innovations: Vec<Vec<f64>>,
     /// What the recordings do not determine.
     pub undetermined: Vec<Undetermined>,
+    /// Tests of the residuals.
+    pub tests: Vec<ResidualTest>,
 }
 
 /// Rounds of noise model and parameters.
@@ -264,6 +268,7 @@ fn finish(problem: &Problem, fit: Fit, other_criterion: Option<f64>) -> PlantEst
     let simulated = Deviance::new(problem, Form::FreeRun, fit.noise.clone())
         .simulated(&fit.point)
         .unwrap_or_default();
+    let tests = residual_tests(problem, &fit, &innovations, &simulated);
     PlantEstimate {
         points,
         parameters,
@@ -286,5 +291,83 @@ fn finish(problem: &Problem, fit: Fit, other_criterion: Option<f64>) -> PlantEst
         simulated,
         innovations,
         undetermined,
+        tests,
     }
+}
+
+/// Tests of the residuals: are they white, and no function of the inputs? What the parameters could do is taken out of neither
+/// side, so that the tests are somewhat too mild.
+fn residual_tests(
+    problem: &Problem,
+    fit: &Fit,
+    innovations: &[Vec<f64>],
+    simulated: &[Vec<f64>],
+) -> Vec<ResidualTest> {
+    let l = problem.outputs();
+    let mut tests = Vec::new();
+    for output in 0..l {
+        let series: Vec<&[f64]> = innovations
+            .iter()
+            .skip(output)
+            .step_by(l)
+            .map(Vec::as_slice)
+            .collect();
+        tests.extend(adequacy::white(
+            output,
+            &series,
+            fit.noise.colours[output].len(),
+        ));
+        let (mut residuals, mut inputs, mut products) =
+            (Vec::new(), Vec::<Vec<f64>>::new(), Vec::<Vec<f64>>::new());
+        for (r, recording) in problem.recordings.iter().enumerate() {
+            let mask = &problem.mask[r * l + output];
+            let whitened = |columns: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+                columns
+                    .iter()
+                    .map(|c| problem.whiten(&fit.noise, output, c, mask))
+                    .collect()
+            };
+            let append = |to: &mut Vec<Vec<f64>>, columns: Vec<Vec<f64>>| {
+                to.resize(columns.len().max(to.len()), Vec::new());
+                to.iter_mut().zip(columns).for_each(|(to, c)| to.extend(c));
+            };
+            residuals.extend(
+                series[r]
+                    .iter()
+                    .zip(mask)
+                    .filter(|(_, keep)| **keep)
+                    .map(|(e, _)| *e),
+            );
+            append(
+                &mut inputs,
+                whitened(
+                    recording
+                        .inputs
+                        .iter()
+                        .flat_map(|u| adequacy::lagged(u))
+                        .collect(),
+                ),
+            );
+            let signals: Vec<&[f64]> = recording
+                .inputs
+                .iter()
+                .chain(&simulated[r * l..(r + 1) * l])
+                .map(Vec::as_slice)
+                .collect();
+            append(&mut products, whitened(adequacy::products(&signals)));
+        }
+        tests.extend(adequacy::score(
+            output,
+            Question::Inputs,
+            &residuals,
+            &inputs,
+        ));
+        tests.extend(adequacy::score(
+            output,
+            Question::Products,
+            &residuals,
+            &products,
+        ));
+    }
+    tests
 }

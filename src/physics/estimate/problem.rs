@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng};
 
 use super::EstimateOptions;
 use super::optimise::Range;
-use crate::noise::Mask;
+use crate::noise::{Mask, Noise};
 use crate::physics::simulate::{Excitation, Plan, Plant, Point, SimulationError};
 use crate::physics::spec::VariableKind;
 
@@ -263,6 +263,15 @@ impl<'a> Problem<'a> {
                 point
             })
             .collect()
+    }
+
+    /// Values of a column that count, whitened as those of an output.
+    pub fn whiten(&self, noise: &Noise, output: usize, column: &[f64], mask: &[bool]) -> Vec<f64> {
+        let mut series = vec![Vec::new(); self.outputs()];
+        let mut masks = vec![Vec::new(); self.outputs()];
+        series[output] = column.to_vec();
+        masks[output] = mask.to_vec();
+        noise.whiten_kept(&series, &masks)
     }
 
     /// Parameters and initial states of each recording.

@@ -1,0 +1,179 @@
+//! Plants in equations on the command line: reading them, their columns, values given by name.
+
+use std::path::Path;
+
+use anyhow::Context;
+
+use super::Verbosity;
+use super::roles::{RoleFlags, tell_reading};
+use crate::identify::{IdentifiedChannel, Recording};
+use crate::log::{Channel, Log, Reading, RoleNeed, Roles, Source};
+use crate::physics::estimate::PlantRecording;
+use crate::physics::{Hold, Plant, Point, check_units, parse};
+use crate::report::{PlantDocument, is_plant};
+
+/// A plant from a file.
+pub(super) struct LoadedPlant {
+    pub plant: Plant,
+    /// Values of the text, or those that were estimated.
+    pub point: Point,
+    pub hold: Hold,
+}
+
+/// Whether a file holds a plant: a text by its name, or a document by what it says.
+pub(super) fn is_plant_file(path: &Path) -> bool {
+    is_text(path) || std::fs::read_to_string(path).is_ok_and(|text| is_plant(&text))
+}
+
+fn is_text(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("mo"))
+}
+
+/// Reads a plant.
+pub(super) fn load(path: &Path) -> anyhow::Result<LoadedPlant> {
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
+    if !is_text(path) && text.trim_start().starts_with('{') {
+        let document = PlantDocument::parse(&name, &text)?;
+        let (plant, point) = document
+            .plant()
+            .map_err(|e| anyhow::anyhow!("{name}: {e}"))?;
+        return Ok(LoadedPlant {
+            plant,
+            point,
+            hold: document.hold(),
+        });
+    }
+    let spec = parse(&text).map_err(|e| anyhow::anyhow!("{}", e.render(&name, &text)))?;
+    check_units(&spec).map_err(|e| anyhow::anyhow!("{}", e.render(&name, &text)))?;
+    let plant = Plant::new(spec);
+    let point = plant.nominal();
+    Ok(LoadedPlant {
+        plant,
+        point,
+        hold: Hold::Zero,
+    })
+}
+
+/// Channels of the plant's inputs and outputs.
+pub(super) fn channels(plant: &Plant) -> (Vec<IdentifiedChannel>, Vec<IdentifiedChannel>) {
+    let channel = |v| IdentifiedChannel {
+        channel: Channel::new(plant.spec.variable(v).column()),
+        level: 0.0,
+        delay: 0,
+    };
+    let spec = &plant.spec;
+    (
+        spec.inputs().into_iter().map(channel).collect(),
+        spec.outputs().into_iter().map(channel).collect(),
+    )
+}
+
+/// Reads recordings of a plant; one with gaps is several.
+pub(super) fn read_recordings(
+    plant: &Plant,
+    sources: &[Source],
+    flags: &RoleFlags,
+    need: RoleNeed,
+    say: Verbosity,
+) -> anyhow::Result<(Vec<Log>, Vec<Recording>)> {
+    let (inputs, outputs) = channels(plant);
+    let roles: Roles = flags.clone().of_model(&inputs, &outputs)?;
+    let need = if inputs.is_empty() {
+        RoleNeed::OutputsOnly
+    } else {
+        need
+    };
+    let (mut logs, mut recordings) = (Vec::new(), Vec::new());
+    for source in sources {
+        let reading = Reading::read(source, &roles, need)?;
+        tell_reading(&source.to_string(), reading.said.as_deref(), say);
+        for log in &reading.logs {
+            recordings.push(Recording {
+                name: log.name.clone(),
+                sha256: log.sha256.clone(),
+                samples: log.samples(),
+                start_time: log.start_time,
+                origin: reading.origin.as_ref().map(ToString::to_string),
+                reading: reading.said.clone(),
+            });
+        }
+        logs.extend(reading.logs);
+    }
+    Ok((logs, recordings))
+}
+
+/// A log as a recording of the plant.
+pub(super) fn recording(log: &Log) -> PlantRecording {
+    PlantRecording {
+        inputs: log.input_data.clone(),
+        outputs: log.output_data.clone(),
+        sample_time: log.sample_time,
+        start_time: log.start_time,
+    }
+}
+
+/// `name=value` pairs, separated by commas.
+pub(super) fn assignments(flag: &str, text: &str) -> anyhow::Result<Vec<(String, f64)>> {
+    text.split(',')
+        .map(|pair| {
+            let (name, value) = pair
+                .split_once('=')
+                .with_context(|| format!("{flag}: `{pair}` is no `name=value`"))?;
+            let value: f64 = value
+                .trim()
+                .parse()
+                .ok()
+                .filter(|v: &f64| v.is_finite())
+                .with_context(|| format!("{flag}: `{}` is no number", value.trim()))?;
+            Ok((name.trim().to_owned(), value))
+        })
+        .collect()
+}
+
+/// Sets parameters by name.
+pub(super) fn set_parameters(
+    plant: &Plant,
+    point: &mut Point,
+    values: &[(String, f64)],
+) -> anyhow::Result<()> {
+    let parameters = plant.spec.parameters();
+    for (name, value) in values {
+        let at = parameters.iter().position(|&v| plant.spec.variable(v).name == *name).with_context(|| {
+            let known: Vec<&str> = parameters.iter().map(|&v| plant.spec.variable(v).name.as_str()).collect();
+            match plant.spec.find(name) {
+                Some(_) => format!("--parameters: `{name}` is not a parameter that may be changed; these are: {}", known.join(", ")),
+                None => format!("--parameters: the plant has no parameter `{name}`; it has {}", known.join(", ")),
+            }
+        })?;
+        point.parameters[at] = *value;
+    }
+    Ok(())
+}
+
+/// Sets initial states by name.
+pub(super) fn set_start(
+    plant: &Plant,
+    point: &mut Point,
+    values: &[(String, f64)],
+) -> anyhow::Result<()> {
+    let states = plant.spec.states();
+    for (name, value) in values {
+        let at = states
+            .iter()
+            .position(|&v| plant.spec.variable(v).name == *name)
+            .with_context(|| {
+                let known: Vec<&str> = states
+                    .iter()
+                    .map(|&v| plant.spec.variable(v).name.as_str())
+                    .collect();
+                format!(
+                    "--initial-state: the plant has no state `{name}`; it has {}",
+                    known.join(", ")
+                )
+            })?;
+        point.start[at] = Some(*value);
+    }
+    Ok(())
+}

@@ -1,0 +1,138 @@
+//! `innovant simulate` of a plant in equations.
+
+use std::path::Path;
+
+use super::plant::{
+    LoadedPlant, assignments, channels, load, read_recordings, recording, set_parameters, set_start,
+};
+use super::roles::RoleFlags;
+use super::{Outcome, Verbosity};
+use crate::log::{Channel, RoleNeed, Source, write_table};
+use crate::physics::estimate::{EstimateOptions, Form, estimate};
+use crate::physics::{Excitation, Hold, Point};
+use crate::report::{PlantDocument, is_plant};
+
+/// Where the states start.
+#[derive(Debug, Clone)]
+pub(super) enum Start {
+    /// Values of the text.
+    Text,
+    /// All zero.
+    Zero,
+    /// Those that fit the recorded outputs best.
+    Estimate,
+    /// Some of them by name.
+    Given(String),
+}
+
+/// What is asked of a plant.
+pub(super) struct PlantRun<'a> {
+    pub plant: &'a Path,
+    pub input: &'a Source,
+    pub roles: &'a RoleFlags,
+    pub parameters: Option<&'a str>,
+    pub start: Start,
+    pub hold: Option<Hold>,
+    pub output: &'a Path,
+}
+
+pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
+    let LoadedPlant {
+        plant,
+        mut point,
+        hold,
+    } = load(asked.plant)?;
+    let hold = asked.hold.unwrap_or(hold);
+    if let Some(text) = asked.parameters {
+        parameters(&plant, &mut point, text)?;
+    }
+    let estimated = matches!(asked.start, Start::Estimate);
+    let need = if estimated {
+        RoleNeed::Identify
+    } else {
+        RoleNeed::InputsOnly
+    };
+    let (mut logs, _) = read_recordings(
+        &plant,
+        std::slice::from_ref(asked.input),
+        asked.roles,
+        need,
+        say,
+    )?;
+    if logs.len() != 1 {
+        anyhow::bail!(
+            "{}: samples are missing in the middle; a simulation needs one without gaps (--missing interpolate)",
+            asked.input
+        );
+    }
+    let log = logs.remove(0);
+    match &asked.start {
+        Start::Text => {}
+        Start::Zero => point.start.fill(Some(0.0)),
+        Start::Given(text) => {
+            set_start(&plant, &mut point, &assignments("--initial-state", text)?)?
+        }
+        Start::Estimate => {
+            let options = EstimateOptions {
+                free: vec![false; point.parameters.len()],
+                hold,
+                form: Some(Form::FreeRun),
+            };
+            let at_values = plant.with_values(&point.parameters);
+            let found = estimate(&at_values, &[recording(&log)], &options)?;
+            point.start = found.points[0].start.clone();
+        }
+    }
+    let inputs: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
+    let excitation = Excitation {
+        inputs: &inputs,
+        length: log.samples(),
+        sample_time: log.sample_time,
+        start_time: log.start_time,
+        hold,
+    };
+    let run = plant
+        .simulate(&point, &excitation, None)
+        .map_err(|e| anyhow::anyhow!("{}: {e}", asked.plant.display()))?;
+    let (_, outputs) = channels(&plant);
+    let units = plant
+        .spec
+        .outputs()
+        .into_iter()
+        .map(|v| plant.spec.variable(v).unit_text.clone());
+    let named: Vec<Channel> = outputs
+        .into_iter()
+        .zip(units)
+        .map(|(c, unit)| Channel {
+            name: c.channel.name,
+            unit,
+        })
+        .collect();
+    let columns: Vec<(&Channel, &[f64])> = named
+        .iter()
+        .zip(run.outputs.iter().map(Vec::as_slice))
+        .collect();
+    write_table(asked.output, log.sample_time, log.start_time, &columns)?;
+    Ok(Outcome::Done)
+}
+
+/// Values by name, or those of a plant that was estimated.
+fn parameters(plant: &crate::physics::Plant, point: &mut Point, text: &str) -> anyhow::Result<()> {
+    if text.contains('=') {
+        return set_parameters(plant, point, &assignments("--parameters", text)?);
+    }
+    let document = std::fs::read_to_string(text).map_err(|e| {
+        anyhow::anyhow!(
+            "--parameters: {text} is neither `name=value` nor a file that can be read: {e}"
+        )
+    })?;
+    if !is_plant(&document) {
+        anyhow::bail!("--parameters: {text} is not what `innovant identify --structure` writes");
+    }
+    let values: Vec<(String, f64)> = PlantDocument::parse(text, &document)?
+        .parameters
+        .into_iter()
+        .map(|p| (p.name, p.value))
+        .collect();
+    set_parameters(plant, point, &values)
+}
