@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Fuzzes the targets of this folder one after the other, led by coverage, with integer overflow and debug assertions checked.
 #
-#   bash fuzz/run.sh [SECONDS] [TARGET...]     default: 600 seconds each of all five
+#   bash fuzz/run.sh [SECONDS] [TARGET...]     default: 600 seconds each of all six
 #
 # Installs cargo-fuzz where it is missing, and needs a nightly toolchain (`rustup toolchain install nightly`). Corpus and
 # findings stay in fuzz/corpus and fuzz/artifacts; a finding is run again with
@@ -17,7 +17,7 @@ if [[ ${1:-} =~ ^[0-9]+$ ]]; then
 fi
 targets=("$@")
 if [[ ${#targets[@]} -eq 0 ]]; then
-    targets=(csv_reader model_json explanation_json identify explain)
+    targets=(csv_reader model_json explanation_json plant_text identify explain)
 fi
 
 # What a target may hold is bounded by its allocator (bound.rs). On top come code, corpus and coverage of libFuzzer.
@@ -30,7 +30,7 @@ fi
 
 # Longest time that one input may take, in seconds: a hundred times what it takes without instrumentation, and more for a
 # log that is explained, where that is a second. The slowest log known takes 4 s to identify, and 23 s with instrumentation.
-declare -A longest=([csv_reader]=10 [model_json]=10 [explanation_json]=20 [identify]=60 [explain]=120)
+declare -A longest=([csv_reader]=10 [model_json]=10 [explanation_json]=20 [plant_text]=30 [identify]=60 [explain]=120)
 
 # One thread: what is found is found again.
 export RAYON_NUM_THREADS=1

@@ -2,7 +2,7 @@
 
 #[path = "../bound.rs"]
 mod bound;
-#[allow(dead_code, unused_imports, reason = "each target is one of five")]
+#[allow(dead_code, unused_imports, reason = "each target is one of several")]
 #[path = "../../tests/hostile/mod.rs"]
 mod hostile;
 

@@ -13,6 +13,7 @@
 //! | `model` | the model: matrices, simulate, predict, validate, documents |
 //! | `responses` | poles, zeros, frequency and step response with their uncertainty |
 //! | `explanation` | `explain` and its answer |
+//! | `plant` | plants in equations |
 //! | `moments` | recordings reduced to moments |
 //! | `table` | columns of data frames by role |
 
@@ -23,6 +24,7 @@ mod explanation;
 mod model;
 mod moments;
 mod options;
+mod plant;
 mod records;
 mod responses;
 mod table;
@@ -38,6 +40,7 @@ fn _innovant(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<model::Model>()?;
     module.add_class::<explanation::Explanation>()?;
     module.add_class::<moments::Moments>()?;
+    module.add_class::<plant::Plant>()?;
     module.add_function(wrap_pyfunction!(model::identify, module)?)?;
     module.add_function(wrap_pyfunction!(explanation::explain, module)?)?;
     module.add_function(wrap_pyfunction!(responses::poles, module)?)?;

@@ -18,6 +18,8 @@ pub(super) struct LoadedPlant {
     /// Values of the text, or those that were estimated.
     pub point: Point,
     pub hold: Hold,
+    /// What was estimated, where the file says so.
+    pub document: Option<PlantDocument>,
 }
 
 /// Whether a file holds a plant: a text by its name, or a document by what it says.
@@ -39,10 +41,12 @@ pub(super) fn load(path: &Path) -> anyhow::Result<LoadedPlant> {
         let (plant, point) = document
             .plant()
             .map_err(|e| anyhow::anyhow!("{name}: {e}"))?;
+        let plant = plant.with_values(&point.parameters);
         return Ok(LoadedPlant {
             plant,
             point,
             hold: document.hold(),
+            document: Some(document),
         });
     }
     let spec = parse(&text).map_err(|e| anyhow::anyhow!("{}", e.render(&name, &text)))?;
@@ -53,6 +57,7 @@ pub(super) fn load(path: &Path) -> anyhow::Result<LoadedPlant> {
         plant,
         point,
         hold: Hold::Zero,
+        document: None,
     })
 }
 

@@ -41,6 +41,7 @@ pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         plant,
         mut point,
         hold,
+        document,
     } = load(asked.plant)?;
     let hold = asked.hold.unwrap_or(hold);
     if let Some(text) = asked.parameters {
@@ -67,7 +68,19 @@ pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
     }
     let log = logs.remove(0);
     match &asked.start {
-        Start::Text => {}
+        Start::Text => {
+            // On a recording that it was estimated from, a plant starts where that was found to start.
+            let known = document
+                .iter()
+                .flat_map(|d| d.recordings.iter().zip(&d.initial_states));
+            for (_, states) in known.filter(|(r, _)| {
+                r.sha256.is_some() && r.sha256 == log.sha256 && r.start_time == log.start_time
+            }) {
+                let values: Vec<(String, f64)> =
+                    states.iter().map(|s| (s.name.clone(), s.value)).collect();
+                set_start(&plant, &mut point, &values)?;
+            }
+        }
         Start::Zero => point.start.fill(Some(0.0)),
         Start::Given(text) => {
             set_start(&plant, &mut point, &assignments("--initial-state", text)?)?
@@ -77,6 +90,7 @@ pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
                 free: vec![false; point.parameters.len()],
                 hold,
                 form: Some(Form::FreeRun),
+                least_squares: true,
             };
             let at_values = plant.with_values(&point.parameters);
             let found = estimate(&at_values, &[recording(&log)], &options)?;

@@ -9,12 +9,11 @@ use super::plant::{load, read_recordings, recording};
 use super::roles::RoleFlags;
 use super::terminal::style;
 use super::{Outcome, Verbosity};
-use crate::identify::{Options, identify};
 use crate::log::{Log, RoleNeed, Source, check_same_sampling};
-use crate::physics::estimate::{EstimateOptions, Form, PlantEstimate, PlantRecording, estimate};
-use crate::physics::{Excitation, Hold, Plant};
+use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
+use crate::physics::{Hold, Plant};
 use crate::report::text::plant_estimate_text;
-use crate::report::{FitDocument, PlantDocument};
+use crate::report::{PlantDocument, plant_fits};
 
 /// A plant in equations.
 #[derive(Debug, Clone, Args)]
@@ -47,6 +46,10 @@ pub(super) struct StructureFlags {
     /// likelier]
     #[arg(long, value_enum, requires = "structure")]
     form: Option<FormFlag>,
+    /// Fit the free run by least squares, as if its error were white: closest to the recording, but with standard deviations
+    /// that are too small where the error is not white
+    #[arg(long, requires = "structure", conflicts_with = "form")]
+    least_squares: bool,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -104,6 +107,7 @@ pub(super) fn run(
             FormFlag::FreeRun => Form::FreeRun,
             FormFlag::Innovation => Form::Innovation,
         }),
+        least_squares: flags.least_squares,
     };
     let (logs, recordings) = read_recordings(plant, logs, roles, RoleNeed::Identify, say)?;
     for log in logs.iter().skip(1) {
@@ -118,7 +122,7 @@ pub(super) fn run(
     let estimated = estimate(plant, &records, &options)
         .map_err(|e| anyhow::anyhow!("{}: {e}", structure.display()))?;
     let mut document = PlantDocument::new(plant, &estimated, hold);
-    document.fit = fits(plant, &records, &logs, &estimated, hold);
+    document.fit = plant_fits(plant, &records, &logs, &estimated, hold);
     document.sample_time = logs.first().map(|l| l.sample_time);
     document.recordings = recordings;
     if let Some(output) = &output {
@@ -163,92 +167,4 @@ fn free(plant: &Plant, flags: &StructureFlags) -> anyhow::Result<Vec<bool>> {
             }
         })
         .collect())
-}
-
-/// `100 (1 - |y - s| / |y - mean y|)` over several recordings, and the root mean square of the error.
-fn fit(pairs: &[(&[f64], &[f64])]) -> (f64, f64) {
-    let (mut error, mut spread, mut count) = (0.0, 0.0, 0.0);
-    for (y, s) in pairs {
-        let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
-        error += y.iter().zip(*s).map(|(y, s)| (y - s).powi(2)).sum::<f64>();
-        spread += y.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
-        count += y.len() as f64;
-    }
-    (
-        100.0 * (1.0 - (error / spread).sqrt()),
-        (error / count).sqrt(),
-    )
-}
-
-/// Fits in free run of the estimate, of the values of the text, and of the best linear model.
-fn fits(
-    plant: &Plant,
-    records: &[PlantRecording],
-    logs: &[Log],
-    estimate: &PlantEstimate,
-    hold: Hold,
-) -> Vec<FitDocument> {
-    let outputs = plant.spec.outputs();
-    let l = outputs.len();
-    let text: Vec<Option<Vec<Vec<f64>>>> = records
-        .iter()
-        .map(|r| {
-            let inputs: Vec<&[f64]> = r.inputs.iter().map(Vec::as_slice).collect();
-            let excitation = Excitation {
-                inputs: &inputs,
-                length: r.outputs[0].len(),
-                sample_time: r.sample_time,
-                start_time: r.start_time,
-                hold,
-            };
-            plant
-                .simulate(&plant.nominal(), &excitation, None)
-                .ok()
-                .map(|t| t.outputs)
-        })
-        .collect();
-    let linear = linear_model(logs);
-    let measured = |o: usize| records.iter().map(move |r| r.outputs[o].as_slice());
-    (0..l)
-        .map(|o| {
-            let simulated = estimate
-                .simulated
-                .iter()
-                .skip(o)
-                .step_by(l)
-                .map(Vec::as_slice);
-            let (percent, rms) = fit(&measured(o).zip(simulated).collect::<Vec<_>>());
-            let of_text: Option<Vec<&[f64]>> = text
-                .iter()
-                .map(|t| t.as_ref().map(|t| t[o].as_slice()))
-                .collect();
-            let of_linear = linear
-                .as_ref()
-                .map(|(_, runs)| runs.iter().map(|r| r[o].as_slice()));
-            FitDocument {
-                output: plant.spec.variable(outputs[o]).column().to_owned(),
-                free_run_percent: percent,
-                rms_error: rms,
-                text_percent: of_text.map(|t| fit(&measured(o).zip(t).collect::<Vec<_>>()).0),
-                linear_model_percent: of_linear
-                    .map(|t| fit(&measured(o).zip(t).collect::<Vec<_>>()).0),
-                linear_model_order: linear.as_ref().map(|(order, _)| *order),
-            }
-        })
-        .collect()
-}
-
-/// Order and free runs of the linear model that is identified from the same recordings.
-fn linear_model(logs: &[Log]) -> Option<(usize, Vec<Vec<Vec<f64>>>)> {
-    let model = identify(logs, &Options::default()).ok()?;
-    let runs: Option<Vec<_>> = logs
-        .iter()
-        .map(|log| {
-            let inputs: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
-            let outputs: Vec<&[f64]> = log.output_data.iter().map(Vec::as_slice).collect();
-            let start = model.initial_state_of(&inputs, &outputs).ok()?;
-            model.simulate(&inputs, Some(&start)).ok()
-        })
-        .collect();
-    Some((model.system.states(), runs?))
 }

@@ -7,6 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::dual::Dual;
+use super::field::Field;
 use super::simulate::{Excitation, Plan, Plant, SimulationError};
 use super::tape::{SwitchSlots, Tape};
 use super::walk::{FINEST, IMPLICIT, Walk};
@@ -14,10 +15,18 @@ use super::walk::{FINEST, IMPLICIT, Walk};
 /// Error of one step that is allowed, as a part of how far a state has moved so far. Errors add up along the recording; with
 /// this value the answers of 64 plants of eight kinds are within 1e-6 of their range (`tests/physics_simulate.rs`).
 pub(super) const STEP_ACCURACY: f64 = 1e-8;
+/// Below this depth errors may double with every halving: they are those of jumps and contacts.
+const RARE: u8 = 8;
+/// The embedded result of the implicit method is of one order less than the step: its error may be so many times larger.
+const EMBEDDED: f64 = 10.0;
+/// A step whose halves agree to this part of what is allowed says how far they need not be computed.
+const TRUSTED: f64 = 0.5;
 /// A state that hardly moves about a large value is computed to this part of [`STEP_ACCURACY`] of that value.
 const OF_LEVEL: f64 = 1e-5;
 /// Error of a step from rest, as a part of the step: what starts to move has no scale yet.
 const FIRST_ACCURACY: f64 = 1e-5;
+/// The finest step of the run that only finds the size of the arguments of switches.
+const ROUGH: u8 = 8;
 /// The explicit method gives way to the implicit one where it would need `2^STIFF` steps in a sample.
 const STIFF: u8 = 7;
 /// After so many stiff samples the explicit method is tried again.
@@ -43,7 +52,14 @@ pub(super) struct Chooser<'p> {
     spread: Vec<f64>,
     /// How far each state that has not moved yet would move in the sample.
     first_move: Vec<f64>,
-    accuracy: Vec<f64>,
+    /// Error that is allowed, and that there is.
+    allowed: Vec<f64>,
+    error: Vec<f64>,
+    /// Error of a step as a part of how far a state has moved.
+    tolerance: f64,
+    /// Difference of the derivatives at the end of a step, by the last stage and by the result, up to which two half steps have
+    /// agreed with it: steps below it are accepted without them.
+    trusted: f64,
     /// Largest argument of each switch so far.
     largest: Vec<f64>,
     /// True when the ramps are to be found.
@@ -51,8 +67,18 @@ pub(super) struct Chooser<'p> {
     middle: Vec<Dual<0>>,
     half: Vec<Dual<0>>,
     slope: Vec<Dual<0>>,
+    end: Vec<Dual<0>>,
     before: Vec<f64>,
     after: Vec<f64>,
+}
+
+/// The largest error, as a multiple of what is allowed.
+fn worst(error: &[f64], allowed: &[f64]) -> f64 {
+    let each = error.iter().zip(allowed).map(|(e, a)| (e / a).abs());
+    each.fold(
+        0.0,
+        |w, e| if e.is_nan() { f64::INFINITY } else { w.max(e) },
+    )
 }
 
 /// How an attempt at a step ended.
@@ -77,12 +103,16 @@ impl<'p> Chooser<'p> {
             origin: walk.x.iter().map(|x| x.value).collect(),
             spread: vec![0.0; n],
             first_move: vec![0.0; n],
-            accuracy: vec![0.0; n],
+            allowed: vec![0.0; n],
+            error: vec![0.0; n],
+            tolerance: plant.accuracy,
+            trusted: 0.0,
             largest: vec![0.0; plant.tape.switches.len()],
             rough,
             middle: room.clone(),
             half: room.clone(),
-            slope: room,
+            slope: room.clone(),
+            end: room,
             before: Vec::new(),
             after: Vec::new(),
         }
@@ -187,6 +217,11 @@ impl<'p> Chooser<'p> {
             self.steps.push(0);
             return Ok(());
         }
+        let finest = if self.rough {
+            coarsest.max(ROUGH)
+        } else {
+            FINEST
+        };
         while place < whole {
             while place % (1 << (FINEST - depth)) != 0 {
                 depth += 1;
@@ -194,9 +229,9 @@ impl<'p> Chooser<'p> {
             let size = 1u32 << (FINEST - depth);
             let time = start.plus(share(place), length);
             let step = share(size) * length.value;
-            let attempt = self.attempt(walk, &time, step);
+            let attempt = self.attempt(walk, &time, step, depth);
             let accepted = matches!(attempt, Attempt::Error(e) if e <= 1.0);
-            if !accepted && depth < FINEST {
+            if !accepted && depth < finest {
                 depth += 1;
                 if !self.implicit && depth >= STIFF && matches!(attempt, Attempt::Error(_)) {
                     self.implicit = true;
@@ -215,10 +250,9 @@ impl<'p> Chooser<'p> {
                 .push(depth | if self.implicit { IMPLICIT } else { 0 });
             std::mem::swap(&mut walk.x, &mut walk.next);
             place += size;
-            let end = start.plus(share(place), length);
-            walk.field.evaluate(&end, &walk.x, &mut walk.first);
-            walk.field.remember(end.value);
-            // A step twice as long has 32 times the error.
+            std::mem::swap(&mut walk.first, &mut self.end);
+            walk.field.remember(start.plus(share(place), length).value);
+            // A step twice as long has 16 to 32 times the error.
             if matches!(attempt, Attempt::Error(e) if e < 1.0 / 40.0) && depth > coarsest {
                 depth -= 1;
             }
@@ -227,25 +261,15 @@ impl<'p> Chooser<'p> {
         Ok(())
     }
 
-    /// One step and two half steps; the one step is left in `walk.next`.
-    fn attempt(&mut self, walk: &mut Walk<0>, time: &Dual<0>, step: f64) -> Attempt {
-        let (whole, half) = (Dual::constant(step), Dual::constant(0.5 * step));
-        let middle = time.plus(0.5 * step, &Dual::constant(1.0));
+    /// One step, left in `walk.next`, with the derivative at its end in `self.end`, and its error.
+    fn attempt(&mut self, walk: &mut Walk<0>, time: &Dual<0>, step: f64, depth: u8) -> Attempt {
+        let (whole, half, one) = (
+            Dual::constant(step),
+            Dual::constant(0.5 * step),
+            Dual::constant(1.0),
+        );
         walk.field.switches(&mut self.before);
-        let known = walk
-            .x
-            .iter()
-            .zip(&self.spread)
-            .zip(&self.origin)
-            .zip(&self.first_move);
-        for (a, (((x, s), o), first)) in self.accuracy.iter_mut().zip(known) {
-            let moved = s.max((x.value - o).abs());
-            let moved = if *s == 0.0 { moved.max(*first) } else { moved };
-            *a = STEP_ACCURACY
-                * moved
-                    .max(OF_LEVEL * x.value.abs())
-                    .max(f64::MIN_POSITIVE / STEP_ACCURACY);
-        }
+        self.allow(walk, depth);
         let Walk {
             field,
             stages,
@@ -253,66 +277,93 @@ impl<'p> Chooser<'p> {
             first,
             next,
         } = walk;
-        if self.implicit {
+        let end = time.plus(step, &one);
+        let error = if self.implicit {
             // A state that has not moved yet has no scale of its own; Newton's iteration needs one.
-            let accuracy: Vec<f64> = self
-                .accuracy
-                .iter()
-                .zip(&*first)
-                .map(|(a, f)| a.max(STEP_ACCURACY * (f.value * step).abs()).max(1e-300))
-                .collect();
-            let solved = stages.implicit(field, time, &whole, x, &accuracy, next)
-                && stages.implicit(field, time, &half, x, &accuracy, &mut self.middle)
-                && stages.implicit(
+            for (a, f) in self.allowed.iter_mut().zip(&*first) {
+                *a = a.max(self.tolerance * (f.value * step).abs()).max(1e-300);
+            }
+            if !stages.implicit(field, time, &whole, x, &self.allowed, next) {
+                return Attempt::Error(f64::INFINITY);
+            }
+            stages.embedded_error(step, &mut self.error);
+            field.evaluate(&end, next, &mut self.end);
+            worst(&self.error, &self.allowed) / EMBEDDED
+        } else {
+            stages.explicit(field, time, &whole, x, first, next);
+            field.evaluate(&end, next, &mut self.end);
+            for (i, a) in self.allowed.iter_mut().enumerate() {
+                *a = a.max(self.tolerance * (next[i].value - self.origin[i]).abs());
+                if self.spread[i] == 0.0 {
+                    *a = a.max(FIRST_ACCURACY * (next[i].value - x[i].value).abs());
+                }
+                self.error[i] = step * (stages.last_explicit()[i].value - self.end[i].value);
+            }
+            let indication = worst(&self.error, &self.allowed);
+            if indication <= self.trusted {
+                indication / self.trusted
+            } else {
+                stages.explicit(field, time, &half, x, first, &mut self.middle);
+                let middle = time.plus(0.5 * step, &one);
+                field.evaluate(&middle, &self.middle, &mut self.slope);
+                stages.explicit(
                     field,
                     &middle,
                     &half,
                     &self.middle,
-                    &accuracy,
+                    &self.slope,
                     &mut self.half,
                 );
-            if !solved {
-                next.iter_mut().for_each(|x| x.value = f64::NAN);
-                return Attempt::Error(f64::INFINITY);
-            }
-        } else {
-            stages.explicit(field, time, &whole, x, first, next);
-            stages.explicit(field, time, &half, x, first, &mut self.middle);
-            field.evaluate(&middle, &self.middle, &mut self.slope);
-            stages.explicit(
-                field,
-                &middle,
-                &half,
-                &self.middle,
-                &self.slope,
-                &mut self.half,
-            );
-        }
-        let mut error: f64 = 0.0;
-        for i in 0..next.len() {
-            let mut allowed =
-                self.accuracy[i].max(STEP_ACCURACY * (next[i].value - self.origin[i]).abs());
-            if self.spread[i] == 0.0 {
-                allowed = allowed.max(FIRST_ACCURACY * (next[i].value - x[i].value).abs());
-            }
-            let e = (next[i].value - self.half[i].value).abs() / allowed;
-            error = error.max(if e.is_nan() { f64::INFINITY } else { e });
-        }
-        let switches = &self.plant.tape.switches;
-        if error <= 1.0 && switches.iter().any(|s| s.moves) {
-            let end = time.plus(step, &Dual::constant(1.0));
-            field.evaluate(&end, next, &mut self.slope);
-            field.switches(&mut self.after);
-            for (i, _) in switches.iter().enumerate().filter(|(_, s)| s.moves) {
-                let (a, b, w) = (self.before[i], self.after[i], field.frame.width[i]);
-                let beyond = a.min(b) >= w || a.max(b) <= -w;
-                let within = a.abs() <= w && b.abs() <= w;
-                if !beyond && !within && (b - a).abs() > RAMP_STEP * w {
-                    return Attempt::Switch;
+                for (e, (a, b)) in self.error.iter_mut().zip(next.iter().zip(&self.half)) {
+                    *e = a.value - b.value;
                 }
+                let error = worst(&self.error, &self.allowed);
+                self.trusted = match error {
+                    e if e <= TRUSTED => indication,
+                    e if e <= 1.0 => self.trusted,
+                    _ => self.trusted.min(0.5 * indication),
+                };
+                // The frame holds the end of the step again.
+                field.evaluate(&end, next, &mut self.end);
+                error
             }
+        };
+        if error <= 1.0 && !self.rough && self.passes_a_switch(&walk.field) {
+            return Attempt::Switch;
         }
         Attempt::Error(error)
+    }
+
+    /// Error that a step at this depth may have, for each state.
+    fn allow(&mut self, walk: &Walk<0>, depth: u8) {
+        // What happens in so small a part of a sample happens rarely; its error does not add up.
+        let rare = 2f64.powi(i32::from(depth.saturating_sub(RARE)));
+        for (i, a) in self.allowed.iter_mut().enumerate() {
+            let x = walk.x[i].value;
+            let moved = self.spread[i].max((x - self.origin[i]).abs());
+            let moved = if self.spread[i] == 0.0 {
+                moved.max(self.first_move[i])
+            } else {
+                moved
+            };
+            *a = self.tolerance
+                * rare
+                * moved
+                    .max(OF_LEVEL * x.abs())
+                    .max(f64::MIN_POSITIVE / self.tolerance);
+        }
+    }
+
+    /// Whether a step that ends where the frame stands crosses a ramp that it does not resolve.
+    fn passes_a_switch(&mut self, field: &Field<0>) -> bool {
+        field.switches(&mut self.after);
+        let switches = self.plant.tape.switches.iter().enumerate();
+        switches.filter(|(_, s)| s.moves).any(|(i, _)| {
+            let (a, b, w) = (self.before[i], self.after[i], field.frame.width[i]);
+            let beyond = a.min(b) >= w || a.max(b) <= -w;
+            let within = a.abs() <= w && b.abs() <= w;
+            !beyond && !within && (b - a).abs() > RAMP_STEP * w
+        })
     }
 
     /// Where a step that has no end goes wrong.

@@ -5,6 +5,7 @@
 //! ```
 
 mod choose;
+mod dense;
 mod dual;
 mod error;
 pub mod estimate;

@@ -197,6 +197,8 @@ pub struct Plant {
     pub(super) tape: Tape,
     /// Values of the parameters, where they are not those of the text.
     nominal: Option<Vec<f64>>,
+    /// Error of a step as a part of how far a state has moved.
+    pub(super) accuracy: f64,
 }
 
 impl Plant {
@@ -207,6 +209,7 @@ impl Plant {
             spec,
             tape,
             nominal: None,
+            accuracy: STEP_ACCURACY,
         }
     }
 
@@ -230,6 +233,14 @@ impl Plant {
         let mut changed = self.clone();
         changed.nominal = Some(parameters.to_vec());
         changed
+    }
+
+    /// The plant simulated with steps whose error is this part of how far a state has moved.
+    pub(super) fn with_accuracy(&self, accuracy: f64) -> Self {
+        Self {
+            accuracy,
+            ..self.clone()
+        }
     }
 
     /// Number of instructions of an evaluation.

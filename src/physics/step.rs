@@ -4,8 +4,7 @@
 //! order 4 with 5 stages (Hairer and Wanner, *Solving Ordinary Differential Equations II*, table IV.6.5); the slopes of a stage
 //! follow from its equation by one solution with the matrix of the last Newton iteration.
 
-use nalgebra::DMatrix;
-
+use super::dense::Factors;
 use super::dual::Dual;
 use super::field::Field;
 
@@ -21,6 +20,8 @@ const WEIGHTS: [&[f64]; 5] = [
     &[371.0 / 1360.0, -137.0 / 2720.0, 15.0 / 544.0],
     &[25.0 / 24.0, -49.0 / 48.0, 125.0 / 16.0, -85.0 / 12.0],
 ];
+/// Difference of the weights of the result and of the embedded result of order 3.
+const DIFFERENCE: [f64; 5] = [-3.0 / 16.0, -27.0 / 32.0, 25.0 / 32.0, 0.0, 0.25];
 /// Newton iterations before a step is given up and halved.
 const ITERATIONS: usize = 12;
 /// A stage is solved to this part of the error that a step may have.
@@ -31,6 +32,7 @@ pub(super) struct Stages<const M: usize> {
     slopes: [Vec<Dual<M>>; 5],
     point: Vec<Dual<M>>,
     base: Vec<Dual<M>>,
+    newton: Newton,
 }
 
 impl<const M: usize> Stages<M> {
@@ -40,7 +42,23 @@ impl<const M: usize> Stages<M> {
             slopes: std::array::from_fn(|_| room()),
             point: room(),
             base: room(),
+            newton: Newton::new(states),
         }
+    }
+
+    /// Derivatives at the last stage of the explicit method: at the end of the step, but for an error of order 3.
+    pub fn last_explicit(&self) -> &[Dual<M>] {
+        &self.slopes[2]
+    }
+
+    /// Difference of the implicit step and the embedded one of order 3, smoothed by the matrix of the last stage, which keeps
+    /// stiff parts from counting that the step damps (Hairer and Wanner, equation IV.8.20).
+    pub fn embedded_error(&self, length: f64, error: &mut [f64]) {
+        for (i, e) in error.iter_mut().enumerate() {
+            let each = self.slopes.iter().zip(DIFFERENCE);
+            *e = length * each.map(|(k, d)| d * k[i].value).sum::<f64>();
+        }
+        self.newton.factors.solve(error);
     }
 
     /// The classical method; `first` is the derivative at the start.
@@ -106,26 +124,34 @@ impl<const M: usize> Stages<M> {
             }
             let at = time.plus_product(INSTANTS[stage], length, &one);
             let step = GAMMA * length.value;
-            let guess: Vec<f64> = match stage {
-                0 => x.iter().map(|x| x.value).collect(),
-                _ => (0..n)
-                    .map(|i| self.base[i].value + step * self.slopes[stage - 1][i].value)
-                    .collect(),
-            };
-            let base: Vec<f64> = self.base.iter().map(|b| b.value).collect();
-            let Some((values, matrix)) = solve(field, &at, step, &base, guess, accuracy) else {
+            for i in 0..n {
+                let base = self.base[i].value;
+                self.newton.base[i] = base;
+                self.newton.z[i] = match stage {
+                    0 => x[i].value,
+                    _ => base + step * self.slopes[stage - 1][i].value,
+                };
+            }
+            if !self.newton.solve(field, &at, step, accuracy) {
                 return false;
-            };
+            }
+            let Newton {
+                z,
+                base,
+                factors,
+                right,
+                ..
+            } = &mut self.newton;
             let slope = |i: usize| {
                 if step > 0.0 {
-                    (values[i] - base[i]) / step
+                    (z[i] - base[i]) / step
                 } else {
                     0.0
                 }
             };
             for i in 0..n {
                 let mut point = self.base[i];
-                point.value = values[i];
+                point.value = z[i];
                 for (p, l) in point.slope.iter_mut().zip(&length.slope) {
                     *p += GAMMA * l * slope(i);
                 }
@@ -134,12 +160,14 @@ impl<const M: usize> Stages<M> {
             field.evaluate(&at, &self.point, &mut self.slopes[stage]);
             if M > 0 {
                 // k = f(base + step k): (I - step J) dk = J dbase + df
-                let right = DMatrix::from_fn(n, M, |i, j| self.slopes[stage][i].slope[j]);
-                let Some(solved) = matrix.lu().solve(&right) else {
-                    return false;
-                };
-                for (i, k) in self.slopes[stage].iter_mut().enumerate() {
-                    k.slope = std::array::from_fn(|j| solved[(i, j)]);
+                for lane in 0..M {
+                    for (r, k) in right.iter_mut().zip(&self.slopes[stage]) {
+                        *r = k.slope[lane];
+                    }
+                    factors.solve(right);
+                    for (r, k) in right.iter().zip(&mut self.slopes[stage]) {
+                        k.slope[lane] = *r;
+                    }
                 }
             }
             if step > 0.0 {
@@ -155,57 +183,83 @@ impl<const M: usize> Stages<M> {
     }
 }
 
-/// Solves `z = base + step f(z)`; gives `z` and the matrix `I - step J` there.
-fn solve<const M: usize>(
-    field: &mut Field<M>,
-    at: &Dual<M>,
-    step: f64,
-    base: &[f64],
-    guess: Vec<f64>,
-    accuracy: &[f64],
-) -> Option<(Vec<f64>, DMatrix<f64>)> {
-    let n = base.len();
-    let (mut derivative, mut jacobian) = (vec![0.0; n], vec![0.0; n * n]);
-    let mut z = guess;
-    let size = |of: &[f64]| {
-        of.iter()
-            .zip(accuracy)
-            .map(|(r, a)| (r / a).abs())
-            .fold(0.0, f64::max)
-    };
-    let mut before = f64::INFINITY;
-    let mut taken = vec![0.0; n];
-    for _ in 0..ITERATIONS {
-        field.linearise(at, &z, &mut derivative, &mut jacobian);
-        let residual: Vec<f64> = (0..n)
-            .map(|i| z[i] - base[i] - step * derivative[i])
-            .collect();
-        let now = size(&residual);
-        if !now.is_finite() || (now > 2.0 * before && before.is_finite()) {
-            // Too far: half of the step that was taken.
-            taken.iter_mut().zip(&mut z).for_each(|(t, z)| {
-                *t *= 0.5;
-                *z -= *t;
-            });
-            before = if before.is_finite() { before } else { f64::MAX };
-            if size(&taken) == 0.0 {
-                return None;
-            }
-            continue;
-        }
-        before = now;
-        let matrix = DMatrix::from_fn(n, n, |i, j| f64::from(i == j) - step * jacobian[i * n + j]);
-        let change = matrix
-            .clone()
-            .lu()
-            .solve(&nalgebra::DVector::from_vec(residual))?;
-        for i in 0..n {
-            taken[i] = -change[i];
-            z[i] += taken[i];
-        }
-        if size(&taken) <= STAGE_ACCURACY {
-            return Some((z, matrix));
+/// Newton's iteration for `z = base + step f(z)`.
+struct Newton {
+    base: Vec<f64>,
+    z: Vec<f64>,
+    derivative: Vec<f64>,
+    jacobian: Vec<f64>,
+    taken: Vec<f64>,
+    right: Vec<f64>,
+    /// Of `I - step J`.
+    factors: Factors,
+}
+
+impl Newton {
+    fn new(n: usize) -> Self {
+        let room = || vec![0.0; n];
+        Self {
+            base: room(),
+            z: room(),
+            derivative: room(),
+            jacobian: vec![0.0; n * n],
+            taken: room(),
+            right: room(),
+            factors: Factors::default(),
         }
     }
-    None
+
+    /// Solves from the guess in `z`. False when it does not converge to `accuracy` of each state.
+    fn solve<const M: usize>(
+        &mut self,
+        field: &mut Field<M>,
+        at: &Dual<M>,
+        step: f64,
+        accuracy: &[f64],
+    ) -> bool {
+        let n = self.base.len();
+        let size = |of: &[f64]| {
+            of.iter()
+                .zip(accuracy)
+                .map(|(r, a)| (r / a).abs())
+                .fold(0.0, f64::max)
+        };
+        let mut before = f64::INFINITY;
+        self.taken.fill(0.0);
+        for _ in 0..ITERATIONS {
+            field.linearise(at, &self.z, &mut self.derivative, &mut self.jacobian);
+            for i in 0..n {
+                self.right[i] = self.base[i] + step * self.derivative[i] - self.z[i];
+            }
+            let now = size(&self.right);
+            if !now.is_finite() || (now > 2.0 * before && before.is_finite()) {
+                // Too far: half of the step that was taken.
+                if size(&self.taken) == 0.0 {
+                    return false;
+                }
+                for (t, z) in self.taken.iter_mut().zip(&mut self.z) {
+                    *t *= 0.5;
+                    *z -= *t;
+                }
+                continue;
+            }
+            before = now;
+            let jacobian = &self.jacobian;
+            if !self
+                .factors
+                .factor(n, |i, j| f64::from(i == j) - step * jacobian[i * n + j])
+            {
+                return false;
+            }
+            self.taken.copy_from_slice(&self.right);
+            self.factors.solve(&mut self.taken);
+            for (t, z) in self.taken.iter().zip(&mut self.z) {
+                *z += t;
+            }
+            if size(&self.taken) <= STAGE_ACCURACY {
+                return true;
+            }
+        }
+        false
+    }
 }

@@ -10,6 +10,7 @@
 //! | `text`           | tables for a terminal                                             |
 //! | `page`           | pages of identifications, explanations and reproductions          |
 //! | `overview`       | envelopes and spectra of a recording, gathered while it is read   |
+//! | `plant_fit`      | how an estimated plant follows its recordings                     |
 //! | `plant_document` | the keys of `innovant-plant/1`                                    |
 //! | `reproduction_csv` | all numbers of a reproduction as one long table                 |
 //!
@@ -31,6 +32,7 @@ mod overview;
 mod packed;
 mod page;
 mod plant_document;
+mod plant_fit;
 mod read;
 mod read_explanation;
 mod reproduction_csv;
@@ -53,6 +55,7 @@ pub use page::explanation::explanation_page;
 pub use page::identification::identification_page;
 pub use page::reproduction::reproduction_page;
 pub use plant_document::{FitDocument, PLANT_FORMAT, PlantDocument, is_plant};
+pub use plant_fit::plant_fits;
 pub use read::{ReadModel, parse_model, read_model};
 pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
 pub use reproduction_csv::reproduction_csv;

@@ -13,6 +13,7 @@ from .explanation import Explanation, explain
 from .identification import identify
 from .model import Model
 from .moments import Moments
+from .plant import Plant, PlantEstimate
 from .record import Record
 from .responses import FrequencyResponse, Roots, StepResponse
 from .validation import Validation
@@ -23,6 +24,8 @@ __all__ = [
     "InnovantError",
     "Model",
     "Moments",
+    "Plant",
+    "PlantEstimate",
     "Record",
     "Roots",
     "StepResponse",

@@ -54,6 +54,36 @@ class Explanation:
     def simulate(self, u: _Array, x0: list[float] | None, simulation: _Array | None) -> _Array: ...
     def initial_state(self, u: _Array, y: _Array) -> _Array: ...
 
+class Plant:
+    def __init__(self, name: str, text: str) -> None: ...
+    def text(self) -> str: ...
+    def inputs(self) -> list[str]: ...
+    def outputs(self) -> list[str]: ...
+    def states(self) -> list[str]: ...
+    def parameters(self) -> list[tuple[str, float]]: ...
+    def simulate(
+        self,
+        u: _Array,
+        dt: float,
+        start_time: float,
+        parameters: list[tuple[str, float]],
+        start: list[tuple[str, float]],
+        hold: str,
+    ) -> _Array: ...
+    def fit(
+        self,
+        u: list[_Array],
+        y: list[_Array],
+        dt: float,
+        fix: list[str],
+        hold: str,
+        form: str | None,
+        least_squares: bool,
+    ) -> tuple[str, str]: ...
+    def linearise(
+        self, state: list[tuple[str, float]], inputs: list[float]
+    ) -> tuple[_Array, _Array, _Array, _Array]: ...
+
 class Moments:
     def __init__(
         self, u: _Array, y: _Array, dt: float, names: _Names, overlap: int, keep: int, json: str

@@ -44,23 +44,24 @@ pub(super) fn undetermined(
     let scaled = DMatrix::from_fn(known.len(), known.len(), |a, b| {
         covariance[(known[a], known[b])] / (magnitudes[known[a]] * magnitudes[known[b]]).max(1e-300)
     });
+    if known.is_empty() {
+        return found;
+    }
     let eigen = scaled.symmetric_eigen();
     for (k, value) in eigen.eigenvalues.iter().enumerate() {
         if value.sqrt() < WIDE {
             continue;
         }
         let direction = eigen.eigenvectors.column(k);
-        let members: Vec<usize> = (0..known.len())
-            .filter(|&a| direction[a].abs() > MEMBER)
-            .collect();
         // Relative changes along the direction.
-        let relative: Vec<f64> = members
-            .iter()
-            .map(|&a| {
-                direction[a] * magnitudes[known[a]] / point[known[a]].abs().max(1e-300)
-                    * point[known[a]].signum()
-            })
+        let change = |a: usize| direction[a] * magnitudes[known[a]] / nonzero(point[known[a]]);
+        let most = (0..known.len())
+            .map(|a| change(a).abs())
+            .fold(0.0, f64::max);
+        let members: Vec<usize> = (0..known.len())
+            .filter(|&a| change(a).abs() > MEMBER * most)
             .collect();
+        let relative: Vec<f64> = members.iter().map(|&a| change(a)).collect();
         let who: Vec<String> = members.iter().map(|&a| names[known[a]].clone()).collect();
         let size = relative.iter().map(|r| r.abs()).fold(0.0, f64::max);
         let alike = relative
@@ -93,6 +94,11 @@ pub(super) fn undetermined(
         });
     }
     found
+}
+
+/// The value, or a very small one for 0.
+fn nonzero(value: f64) -> f64 {
+    if value == 0.0 { 1e-300 } else { value }
 }
 
 fn list(names: &[String]) -> String {

@@ -178,16 +178,18 @@ impl<'p, 'a> Deviance<'p, 'a> {
         matrix.iter().all(|v| v.is_finite()).then_some(matrix)
     }
 
-    /// Covariance of the free numbers. The numbers of the noise model are taken along: under feedback their estimates are
-    /// correlated with those of the plant.
-    pub fn covariance(&mut self, point: &[f64]) -> DMatrix<f64> {
+    /// Covariances of the free numbers.
+    pub fn covariances(&mut self, point: &[f64]) -> Covariances {
         let m = point.len();
         let nothing_known = || DMatrix::from_diagonal_element(m, m, f64::INFINITY);
-        let Some(runs) = self.at(point) else {
-            return nothing_known();
-        };
-        let Some(plant) = self.jacobian(&runs) else {
-            return nothing_known();
+        let jacobian = self
+            .at(point)
+            .and_then(|runs| Some((self.jacobian(&runs)?, runs)));
+        let Some((plant, runs)) = jacobian else {
+            return Covariances {
+                joint: nothing_known(),
+                given_noise: nothing_known(),
+            };
         };
         let of_noise = self.noise_columns(&runs.residual);
         let all = DMatrix::from_fn(plant.nrows(), m + of_noise.len(), |i, j| {
@@ -203,8 +205,14 @@ impl<'p, 'a> Deviance<'p, 'a> {
         } else {
             1.0
         };
-        invert(&(information * all.tr_mul(&all)))
-            .map_or_else(nothing_known, |c| c.view((0, 0), (m, m)).into_owned())
+        let inverse = |of: &DMatrix<f64>| {
+            let covariance = invert(&(information * of.tr_mul(of)));
+            covariance.map_or_else(nothing_known, |c| c.view((0, 0), (m, m)).into_owned())
+        };
+        Covariances {
+            joint: inverse(&all),
+            given_noise: inverse(&plant),
+        }
     }
 
     /// Derivatives of the whitened residual by the coefficients of the colours, by differences.
@@ -237,6 +245,14 @@ impl<'p, 'a> Deviance<'p, 'a> {
         }
         columns
     }
+}
+
+/// Covariances of the free numbers.
+pub(super) struct Covariances {
+    /// With the numbers of the noise model estimated beside them: under feedback these estimates are correlated.
+    pub joint: DMatrix<f64>,
+    /// With the noise model given.
+    pub given_noise: DMatrix<f64>,
 }
 
 impl Objective for Deviance<'_, '_> {

@@ -24,7 +24,7 @@ use self::deviance::Deviance;
 use self::optimise::{Effort, minimise};
 use self::problem::Problem;
 use super::simulate::{Hold, Plant, Point};
-use crate::noise::{Colours, Noise};
+use crate::noise::Noise;
 
 /// How the predictions of a plant are formed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,6 +44,8 @@ pub struct EstimateOptions {
     pub hold: Hold,
     /// The form; none chooses by likelihood.
     pub form: Option<Form>,
+    /// Least squares in free run: noise is taken as white. For simulation, where the equations are known to be approximate.
+    pub least_squares: bool,
 }
 
 /// An estimated parameter.
@@ -101,7 +103,7 @@ pub struct PlantEstimate {
 /// Rounds of noise model and parameters.
 const ROUNDS: usize = 4;
 /// A round that gains less than this in the deviance is the last.
-const SETTLED: f64 = 0.02;
+const SETTLED: f64 = 0.05;
 /// Effort of a search.
 const SEARCH: Effort = Effort {
     iterations: 60,
@@ -113,12 +115,22 @@ const ROUND: Effort = Effort {
 };
 /// Effort for a first look at a start.
 const GLANCE: Effort = Effort {
-    iterations: 3,
+    iterations: 6,
     settled: 1.0,
 };
-/// Starts that are drawn within the bounds besides the values of the text, and how many of all are searched to the end.
-const DRAWN_STARTS: usize = 4;
-const KEPT_STARTS: usize = 2;
+/// Draws within the bounds are compared on the first samples of each recording; on short recordings there are more of them.
+const GLANCED_SAMPLES: usize = 1500;
+const GLANCED_VALUES: usize = 12_000;
+const LEAST_DRAWS: usize = 4;
+const MOST_DRAWS: usize = 10;
+/// Deviances that differ by less are those of one summit.
+const SAME_SUMMIT: f64 = 1.0;
+/// How many of them are searched to the end.
+const KEPT_DRAWS: usize = 2;
+/// A criterion that is larger than that of a rival by this is not improved further.
+const HOPELESS: f64 = 200.0;
+/// Level at which residuals are said to depend on the inputs.
+const NOISE: f64 = 1e-3;
 
 /// Estimates a plant from recordings of it.
 ///
@@ -130,26 +142,48 @@ pub fn estimate(
     options: &EstimateOptions,
 ) -> Result<PlantEstimate, EstimateError> {
     let problem = Problem::new(plant, recordings, options)?;
-    let mut free_run = match options.form {
-        Some(Form::Innovation) => None,
-        _ => fit_free_run(&problem, None),
+    let form = if options.least_squares {
+        Some(Form::FreeRun)
+    } else {
+        options.form
     };
-    // Where free run leaves white noise an observer has nothing to correct.
-    let coloured = free_run
-        .as_ref()
-        .is_none_or(|f| f.noise.colours.iter().any(|c| c.len() > 0));
-    let innovation = match options.form {
-        Some(Form::FreeRun) => None,
-        None if !coloured => None,
-        _ => observer::fit(&problem, free_run.as_ref().map(|f| f.point.as_slice())),
-    };
-    if let (None, Some(other)) = (options.form, &innovation) {
-        let again = fit_free_run(&problem, Some(&other.point));
-        let better = |a: &Fit| free_run.as_ref().is_none_or(|b| a.criterion < b.criterion);
-        if again.as_ref().is_some_and(better) {
-            free_run = again;
+    let (free_run, innovation) = match form {
+        Some(Form::FreeRun) => (fit_free_run(&problem), None),
+        Some(Form::Innovation) => (None, observer::fit(&problem, None)),
+        None if observer::integrates(&problem) => {
+            // In free run the errors of such a plant grow: it comes second, from where the observer has led.
+            let innovation = observer::fit(&problem, None);
+            let free_run = match &innovation {
+                Some(fit) => continue_free_run(&problem, fit),
+                None => fit_free_run(&problem),
+            };
+            (free_run, innovation)
         }
-    }
+        None => {
+            let free_run = fit_free_run(&problem);
+            // Where free run leaves white noise an observer has nothing to correct.
+            let coloured = free_run
+                .as_ref()
+                .is_none_or(|f| f.noise.colours.iter().any(|c| c.len() > 0));
+            let innovation = if coloured {
+                promising_innovation(&problem, free_run.as_ref())
+            } else {
+                None
+            };
+            let wins = |i: &Fit| free_run.as_ref().is_none_or(|f| i.criterion < f.criterion);
+            match innovation {
+                // From where the observer has led, the free run may find a higher summit.
+                Some(i) if wins(&i) => {
+                    let again = continue_free_run(&problem, &i);
+                    let better = again.as_ref().is_some_and(|a| {
+                        free_run.as_ref().is_none_or(|f| a.criterion < f.criterion)
+                    });
+                    (if better { again } else { free_run }, Some(i))
+                }
+                other => (free_run, other),
+            }
+        }
+    };
     let (best, other) = match (free_run, innovation) {
         (Some(a), Some(b)) if b.criterion < a.criterion => (b, Some(a.criterion)),
         (Some(a), b) => (a, b.map(|b| b.criterion)),
@@ -169,39 +203,104 @@ struct Fit {
     criterion: f64,
 }
 
-/// The fit in free run: from the point of the other form, or from the values of the text and draws within the bounds.
-fn fit_free_run(problem: &Problem, other: Option<&[f64]>) -> Option<Fit> {
-    let nominal = problem.nominal();
-    let mut objective = Deviance::new(problem, Form::FreeRun, Noise::unit(problem.outputs()));
-    let mut point = match other {
-        Some(point) => point[..nominal.len()].to_vec(),
-        None => {
-            let mut starts = vec![nominal];
-            starts.extend(problem.draws(DRAWN_STARTS));
-            let glance = |mut point: Vec<f64>| {
-                let mut objective =
-                    Deviance::new(problem, Form::FreeRun, Noise::unit(problem.outputs()));
-                Some((
-                    white_fit(&mut objective, problem, &mut point, GLANCE)?,
-                    point,
-                ))
-            };
-            let mut tried: Vec<(f64, Vec<f64>)> = starts.into_iter().filter_map(glance).collect();
-            tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-            tried.truncate(KEPT_STARTS);
-            for (deviance, point) in &mut tried {
-                *deviance = white_fit(&mut objective, problem, point, SEARCH)?;
-            }
-            tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?.1
-        }
+/// The fit in innovation form, unless free run is the better form on the first part of the recordings already.
+fn promising_innovation(problem: &Problem, free_run: Option<&Fit>) -> Option<Fit> {
+    let Some(free_run) = free_run else {
+        return observer::fit(problem, None);
     };
+    let recordings = problem.first_parts(GLANCED_SAMPLES);
+    let short = problem.with_recordings(&recordings);
+    let first = observer::fit(&short, Some(&free_run.point))?;
+    let residual =
+        Deviance::new(&short, Form::FreeRun, free_run.noise.clone()).residual(&free_run.point)?;
+    let deviance = free_run.noise.deviance(&residual, &short.mask);
+    let rival = short.criterion(deviance, free_run.noise.len(), 0);
+    if first.criterion > rival {
+        return None;
+    }
+    observer::fit(problem, Some(&first.point[..problem.nominal().len()]))
+}
+
+/// The fit in free run from the point of the innovation form.
+fn continue_free_run(problem: &Problem, innovation: &Fit) -> Option<Fit> {
+    let mut point = innovation.point[..problem.nominal().len()].to_vec();
+    white_fit(problem, &mut point, ROUND)?;
+    coloured_fit(problem, point, innovation.criterion)
+}
+
+/// The fit in free run from the values of the text and, unless that leaves white noise that does not depend on the inputs, from
+/// draws within the bounds. Summits are compared under white noise: a coloured noise model would absorb what a wrong one leaves.
+fn fit_free_run(problem: &Problem) -> Option<Fit> {
+    let mut point = problem.nominal();
+    let mut highest = white_fit(problem, &mut point, SEARCH).unwrap_or(f64::INFINITY);
+    let mut best = if highest.is_finite() {
+        coloured_fit(problem, point, f64::INFINITY)
+    } else {
+        None
+    };
+    if best.as_ref().is_some_and(|fit| leaves_noise(problem, fit)) {
+        return best;
+    }
+    // Draws are compared on the first part of the recordings.
+    let recordings = problem.first_parts(GLANCED_SAMPLES);
+    let short = problem.with_recordings(&recordings);
+    let mut tried: Vec<(f64, Vec<f64>)> = Vec::new();
+    let draws = (GLANCED_VALUES / short.count().max(1)).clamp(LEAST_DRAWS, MOST_DRAWS);
+    for draw in problem.draws(draws) {
+        let mut point = draw;
+        if let Some(deviance) = white_fit(&short, &mut point, GLANCE) {
+            tried.push((deviance, point));
+        }
+    }
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (_, mut point) in tried.into_iter().take(KEPT_DRAWS) {
+        let Some(deviance) = white_fit(problem, &mut point, SEARCH) else {
+            continue;
+        };
+        if deviance < highest - SAME_SUMMIT {
+            highest = deviance;
+            best = coloured_fit(problem, point, f64::INFINITY).or(best);
+        }
+    }
+    best
+}
+
+/// Whether the residuals of a fit are white and pass the tests. Coloured noise may hide what another summit explains.
+fn leaves_noise(problem: &Problem, fit: &Fit) -> bool {
+    if fit.noise.colours.iter().any(|c| c.len() > 0) {
+        return false;
+    }
+    let objective = Deviance::new(problem, Form::FreeRun, fit.noise.clone());
+    let (Some(residual), Some(simulated)) = (
+        objective.residual(&fit.point),
+        objective.simulated(&fit.point),
+    ) else {
+        return false;
+    };
+    let innovations = fit.noise.whiten(&residual, &problem.mask);
+    let tests = residual_tests(problem, fit, &innovations, &simulated);
+    let level = NOISE / tests.len().max(1) as f64;
+    tests
+        .iter()
+        .filter(|t| t.question != Question::White)
+        .all(|t| t.p_value > level)
+}
+
+/// Rounds of noise model and parameters from a point; given up where it cannot reach the criterion of a rival.
+fn coloured_fit(problem: &Problem, mut point: Vec<f64>, rival: f64) -> Option<Fit> {
+    let mut objective = Deviance::new(problem, Form::FreeRun, Noise::unit(problem.outputs()));
     let mut last = f64::INFINITY;
     for _ in 0..ROUNDS {
         let residual = objective.residual(&point)?;
-        objective.noise =
-            Noise::estimate(&residual, problem.outputs(), &problem.mask, Colours::All);
+        objective.noise = Noise::estimate(
+            &residual,
+            problem.outputs(),
+            &problem.mask,
+            problem.colours(),
+        );
         let deviance = minimise(&mut objective, &mut point, &problem.ranges(), ROUND)?;
-        if last - deviance < SETTLED {
+        let now = problem.criterion(deviance, objective.noise.len(), 0);
+        if last - deviance < SETTLED || now > rival + HOPELESS {
             last = deviance;
             break;
         }
@@ -218,15 +317,11 @@ fn fit_free_run(problem: &Problem, other: Option<&[f64]>) -> Option<Fit> {
 }
 
 /// Improves a point under white noise whose size is that of what is left; gives the deviance with the size at the end.
-fn white_fit(
-    objective: &mut Deviance,
-    problem: &Problem,
-    point: &mut Vec<f64>,
-    effort: Effort,
-) -> Option<f64> {
+fn white_fit(problem: &Problem, point: &mut Vec<f64>, effort: Effort) -> Option<f64> {
+    let mut objective = Deviance::new(problem, Form::FreeRun, Noise::unit(problem.outputs()));
     for _ in 0..2 {
         objective.noise = objective.rescale(point)?;
-        minimise(objective, point, &problem.ranges(), effort)?;
+        minimise(&mut objective, point, &problem.ranges(), effort)?;
     }
     let residual = objective.residual(point)?;
     Some(
@@ -240,9 +335,10 @@ fn finish(problem: &Problem, fit: Fit, other_criterion: Option<f64>) -> PlantEst
         Form::FreeRun => Deviance::new(problem, Form::FreeRun, fit.noise.clone()),
         Form::Innovation => Deviance::new(problem, Form::Innovation, fit.noise.clone()),
     };
-    let covariance = objective.covariance(&fit.point);
+    let covariances = objective.covariances(&fit.point);
+    let covariance = &covariances.joint;
     let free = problem.free.clone();
-    let undetermined = determined::undetermined(problem, &fit.point, &covariance);
+    let undetermined = determined::undetermined(problem, &fit.point, covariance);
     let ranges = problem.ranges();
     let parameters = free
         .iter()
@@ -251,7 +347,7 @@ fn finish(problem: &Problem, fit: Fit, other_criterion: Option<f64>) -> PlantEst
             let std = covariance[(i, i)].max(0.0).sqrt();
             let value = fit.point[i];
             let at_bound = value <= ranges[i].min || value >= ranges[i].max;
-            let interval = profile::interval(&mut objective, problem, &fit, &covariance, i);
+            let interval = profile::interval(&mut objective, problem, &fit, &covariances, i);
             EstimatedParameter {
                 index,
                 value,
@@ -261,7 +357,7 @@ fn finish(problem: &Problem, fit: Fit, other_criterion: Option<f64>) -> PlantEst
             }
         })
         .collect();
-    let start_std = problem.start_stds(&covariance);
+    let start_std = problem.start_stds(covariance);
     let points = problem.points(&fit.point);
     let residual = objective.residual(&fit.point).unwrap_or_default();
     let innovations = fit.noise.whiten(&residual, &problem.mask);

@@ -7,6 +7,8 @@ use super::optimise::{Range, minimise};
 use super::problem::Problem;
 use super::{Fit, Form, ROUND, ROUNDS, SEARCH, SETTLED};
 use crate::noise::{Colours, Noise};
+use crate::physics::linearise::LinearPlant;
+use crate::physics::simulate::Excitation;
 
 /// Process noise of a sample as a part of the spread of each state, from which gains are computed to start from.
 const DIFFUSION: [f64; 4] = [1e-3, 1e-2, 1e-1, 1.0];
@@ -84,37 +86,81 @@ pub(super) fn fit(problem: &Problem, from: Option<&[f64]>) -> Option<Fit> {
     best
 }
 
+/// Whether the plant, linearised at its mean, forgets its state more slowly than the longest recording lasts, or never.
+pub(super) fn integrates(problem: &Problem) -> bool {
+    let mut slow = false;
+    problem.each(|excitation, _| {
+        let Some((linear, _, _)) = mean_linearisation(problem, excitation) else {
+            return;
+        };
+        let length = excitation.sample_time * excitation.length as f64;
+        let poles = linear.a.complex_eigenvalues();
+        slow |= poles.iter().any(|p| p.re * length > -1.0);
+    });
+    slow
+}
+
+/// The plant linearised at the mean of its free run with the values of the text, that mean, and the spread about it; at the
+/// start values where there is no free run.
+fn mean_linearisation(
+    problem: &Problem,
+    excitation: &Excitation,
+) -> Option<(LinearPlant, Vec<f64>, Vec<f64>)> {
+    let plant = &problem.plant;
+    let point = plant.nominal();
+    let inputs: Vec<f64> = excitation
+        .inputs
+        .iter()
+        .map(|c| mean_and_spread(c).0)
+        .collect();
+    let (centre, spread): (Vec<f64>, Vec<f64>) = match plant.simulate(&point, excitation, None) {
+        Ok(run) => run.states.iter().map(|c| mean_and_spread(c)).unzip(),
+        Err(_) => plant
+            .start(&point)
+            .iter()
+            .map(|&x| (x, x.abs().max(1.0)))
+            .unzip(),
+    };
+    let linear = plant.linearise(&point, &centre, &inputs, excitation.start_time);
+    let sound = linear
+        .a
+        .iter()
+        .chain(linear.c.iter())
+        .all(|v| v.is_finite());
+    sound.then_some((linear, centre, spread))
+}
+
+/// Mean and standard deviation of the values that are there.
+fn mean_and_spread(column: &[f64]) -> (f64, f64) {
+    let known: Vec<f64> = column.iter().copied().filter(|v| v.is_finite()).collect();
+    let n = known.len().max(1) as f64;
+    let mean = known.iter().sum::<f64>() / n;
+    (
+        mean,
+        (known.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt(),
+    )
+}
+
 /// Gains of stationary Kalman filters of the plant linearised at its mean, for several sizes of process noise.
 fn gains(problem: &Problem) -> Vec<DMatrix<f64>> {
     let (n, l) = (problem.states(), problem.outputs());
-    let plant = problem.plant;
     let mut found = Vec::new();
     problem.each(|excitation, outputs| {
         if !found.is_empty() {
             return;
         }
-        let point = plant.nominal();
-        let start = plant.start(&point);
-        let mean = |c: &[f64]| {
-            let known: Vec<f64> = c.iter().copied().filter(|v| v.is_finite()).collect();
-            let m = known.iter().sum::<f64>() / known.len().max(1) as f64;
-            let s = known.iter().map(|v| (v - m).powi(2)).sum::<f64>() / known.len().max(1) as f64;
-            (m, s.sqrt())
+        let Some((linear, centre, spread)) = mean_linearisation(problem, excitation) else {
+            return;
         };
-        let inputs: Vec<f64> = excitation.inputs.iter().map(|c| mean(c).0).collect();
-        let (centre, spread): (Vec<f64>, Vec<f64>) = match plant.simulate(&point, excitation, None)
-        {
-            Ok(run) => run.states.iter().map(|c| mean(c)).unzip(),
-            Err(_) => start.iter().map(|&x| (x, x.abs().max(1.0))).unzip(),
-        };
-        let linear = plant.linearise(&point, &centre, &inputs, excitation.start_time);
         let (phi, _) = linear.discrete(excitation.sample_time);
-        if !phi.iter().chain(linear.c.iter()).all(|v| v.is_finite()) {
+        if !phi.iter().all(|v| v.is_finite()) {
             return;
         }
         let r = DMatrix::from_fn(l, l, |i, j| {
             if i == j {
-                (MEASUREMENT * mean(outputs[i]).1).powi(2).max(1e-300)
+                (MEASUREMENT * mean_and_spread(outputs[i]).1)
+                    .powi(2)
+                    .max(1e-300)
             } else {
                 0.0
             }

@@ -63,7 +63,7 @@ pub(super) fn minimise(
                 .zip(ranges)
                 .map(|((p, s), r)| (p + s.clamp(-r.reach, r.reach)).clamp(r.min, r.max))
                 .collect();
-            if trial == *point {
+            if trial == *point || foretold(&curvature, &descent, point, &trial) < effort.settled {
                 break;
             }
             match objective.deviance(&trial) {
@@ -83,6 +83,12 @@ pub(super) fn minimise(
     }
     // The objective must stand at the point that is given back.
     objective.deviance(point).or(Some(deviance))
+}
+
+/// Decrease of the deviance that the quadratic model foretells.
+fn foretold(curvature: &DMatrix<f64>, descent: &DVector<f64>, from: &[f64], to: &[f64]) -> f64 {
+    let step = DVector::from_iterator(from.len(), to.iter().zip(from).map(|(t, f)| t - f));
+    2.0 * descent.dot(&step) - step.dot(&(curvature * &step))
 }
 
 /// The damped step. What is at a bound and would leave it is held there.

@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng};
 
 use super::EstimateOptions;
 use super::optimise::Range;
-use crate::noise::{Mask, Noise};
+use crate::noise::{Colours, Mask, Noise};
 use crate::physics::simulate::{Excitation, Plan, Plant, Point, SimulationError};
 use crate::physics::spec::VariableKind;
 
@@ -58,7 +58,7 @@ pub enum EstimateError {
 
 /// Recordings, plant and what is free.
 pub(super) struct Problem<'a> {
-    pub plant: &'a Plant,
+    pub plant: Plant,
     pub recordings: &'a [PlantRecording],
     options: &'a EstimateOptions,
     pub mask: Mask,
@@ -90,6 +90,17 @@ impl PlantRecording {
     }
 }
 
+/// Which values are there.
+fn mask(recordings: &[PlantRecording]) -> Mask {
+    let outputs = recordings.iter().flat_map(|r| &r.outputs);
+    outputs
+        .map(|y| y.iter().map(|v| v.is_finite()).collect())
+        .collect()
+}
+
+/// Error of a step while parameters are sought: residuals are larger by orders of magnitude than what adds up from it.
+const STEP_ACCURACY: f64 = 1e-7;
+
 impl<'a> Problem<'a> {
     pub fn new(
         plant: &'a Plant,
@@ -116,11 +127,6 @@ impl<'a> Problem<'a> {
                 }
             }
         }
-        let mask: Mask = recordings
-            .iter()
-            .flat_map(|r| &r.outputs)
-            .map(|y| y.iter().map(|v| v.is_finite()).collect())
-            .collect();
         let free = (0..spec.parameters().len())
             .filter(|&i| options.free.get(i).copied().unwrap_or(true))
             .collect();
@@ -129,11 +135,12 @@ impl<'a> Problem<'a> {
             .filter(|&i| !spec.variable(states[i]).fixed)
             .collect();
         let nominal = plant.nominal();
+        let plant = plant.with_accuracy(STEP_ACCURACY);
         let mut problem = Self {
             plant,
             recordings,
             options,
-            mask,
+            mask: mask(recordings),
             free,
             starts,
             plans: Vec::new(),
@@ -144,6 +151,7 @@ impl<'a> Problem<'a> {
         if samples <= 2 * free {
             return Err(EstimateError::TooShort { free, samples });
         }
+        let plant = problem.plant.clone();
         problem.plans = recordings
             .iter()
             .map(|r| {
@@ -153,6 +161,39 @@ impl<'a> Problem<'a> {
             })
             .collect();
         Ok(problem)
+    }
+
+    /// The first samples of each recording.
+    pub fn first_parts(&self, samples: usize) -> Vec<PlantRecording> {
+        let cut = |columns: &[Vec<f64>]| {
+            columns
+                .iter()
+                .map(|c| c[..c.len().min(samples)].to_vec())
+                .collect()
+        };
+        let part = |r: &PlantRecording| PlantRecording {
+            inputs: cut(&r.inputs),
+            outputs: cut(&r.outputs),
+            ..*r
+        };
+        self.recordings.iter().map(part).collect()
+    }
+
+    /// The same problem on other recordings.
+    pub fn with_recordings<'b>(&self, recordings: &'b [PlantRecording]) -> Problem<'b>
+    where
+        'a: 'b,
+    {
+        Problem {
+            plant: self.plant.clone(),
+            recordings,
+            options: self.options,
+            mask: mask(recordings),
+            free: self.free.clone(),
+            starts: self.starts.clone(),
+            plans: self.plans.clone(),
+            nominal: self.nominal.clone(),
+        }
     }
 
     /// Why the values of the text cannot be simulated.
@@ -263,6 +304,15 @@ impl<'a> Problem<'a> {
                 point
             })
             .collect()
+    }
+
+    /// Noise models that are tried in free run.
+    pub fn colours(&self) -> Colours {
+        if self.options.least_squares {
+            Colours::White
+        } else {
+            Colours::All
+        }
     }
 
     /// Values of a column that count, whitened as those of an output.

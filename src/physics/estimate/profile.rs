@@ -1,9 +1,7 @@
 //! Intervals from the profile of the likelihood, where that is not the parabola of the covariance.
 
-use nalgebra::DMatrix;
-
 use super::Fit;
-use super::deviance::Deviance;
+use super::deviance::{Covariances, Deviance};
 use super::optimise::{Effort, Objective, Range, minimise};
 use super::problem::Problem;
 
@@ -15,20 +13,21 @@ const PARABOLA: (f64, f64) = (0.75 * LEVEL, 1.3 * LEVEL);
 const STRAIGHT: (f64, f64) = (0.85 * LEVEL, 1.15 * LEVEL);
 /// Effort for the other numbers at one value of the parameter.
 const OTHERS: Effort = Effort {
-    iterations: 6,
+    iterations: 4,
     settled: 1e-2,
 };
 /// Values tried on a side.
-const TRIES: usize = 5;
+const TRIES: usize = 3;
 
 /// The 95 % interval of free parameter `i`.
 pub(super) fn interval(
     objective: &mut Deviance,
     problem: &Problem,
     fit: &Fit,
-    covariance: &DMatrix<f64>,
+    covariances: &Covariances,
     i: usize,
 ) -> (f64, f64) {
+    let covariance = &covariances.given_noise;
     let std = covariance[(i, i)].max(0.0).sqrt();
     let mut ranges = problem.ranges();
     ranges.extend(fit.point[ranges.len()..].iter().map(|_| Range {
@@ -40,6 +39,18 @@ pub(super) fn interval(
     let value = fit.point[i];
     if !std.is_finite() || std <= 0.0 {
         return (own.min, own.max);
+    }
+    let joint = covariances.joint[(i, i)].max(0.0).sqrt();
+    let width = own.max - own.min;
+    let open = if width.is_finite() {
+        joint > width / 12f64.sqrt()
+    } else {
+        joint > value.abs()
+    };
+    if open {
+        // Not determined: the parabola is all there is, within the bounds.
+        let reach = LEVEL.sqrt() * joint;
+        return ((value - reach).max(own.min), (value + reach).min(own.max));
     }
     let base = objective.deviance(&fit.point).unwrap_or(fit.deviance);
     let mut side = |sign: f64| {
@@ -93,5 +104,15 @@ pub(super) fn interval(
         best
     };
     let (low, high) = (side(-1.0), side(1.0));
-    (low.max(own.min), high.min(own.max))
+    // The profile is that of the deviance with the noise model given.
+    let wider = joint / std;
+    let wider = if wider.is_finite() {
+        wider.max(1.0)
+    } else {
+        1.0
+    };
+    (
+        (value + wider * (low - value)).max(own.min),
+        (value + wider * (high - value)).min(own.max),
+    )
 }

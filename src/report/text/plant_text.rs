@@ -6,6 +6,8 @@ use super::{Style, wrapped};
 use crate::physics::{ModelSpec, Plant, Unknown, VariableKind};
 use crate::report::PlantDocument;
 
+/// Longest equation that is shown whole.
+const LONGEST: usize = 66;
 /// Level at which a test of residuals is said to fail.
 const LEVEL: f64 = 0.01;
 /// A linear model that leaves less than this share of the plant's error holds what the equations do not.
@@ -86,19 +88,25 @@ pub fn plant_text(plant: &Plant) -> String {
         out += &table.lines();
     }
     out += "\nEquations, in the order in which they are computed\n";
+    let mut table = Table::new(["determines", "from", "line"]).flush_left(1);
     for equation in &spec.equations {
         let what = match equation.unknown {
             Unknown::Derivative(v) => format!("der({})", spec.variable(v).name),
             Unknown::Value(v) => spec.variable(v).name.clone(),
         };
-        out += &wrapped(
-            "  ",
-            &format!(
-                "{what:12} from  {}",
-                squeezed(spec, equation.span.start, equation.span.end)
-            ),
-        );
+        let line = 1 + spec
+            .text
+            .get(..equation.span.start)
+            .map_or(0, |t| t.matches('\n').count());
+        let text = squeezed(spec, equation.span.start, equation.span.end);
+        let text = if text.chars().count() > LONGEST {
+            text.chars().take(LONGEST).collect::<String>() + " ..."
+        } else {
+            text
+        };
+        table.row([what, text, line.to_string()]);
     }
+    out += &table.lines();
     out += &equilibrium(plant);
     out
 }
@@ -136,9 +144,15 @@ fn equilibrium(plant: &Plant) -> String {
             .map(|(&v, x)| format!("{} = {}", spec.variable(v).name, significant(*x, 6)));
         each.collect::<Vec<_>>().join(", ")
     };
-    match still {
+    let within = |x: &Vec<f64>| {
+        states
+            .iter()
+            .zip(x)
+            .all(|(&v, x)| *x >= spec.variable(v).min && *x <= spec.variable(v).max)
+    };
+    match still.filter(within) {
         Some(x) => format!("\nEquilibrium with inputs 0\n{}", wrapped("  ", &list(&x))),
-        None => "\nNo equilibrium with inputs 0 was found from the start values.\n".to_owned(),
+        None => "\nWith inputs 0 no equilibrium was found from the start values.\n".to_owned(),
     }
 }
 
@@ -235,7 +249,8 @@ fn verdict(document: &PlantDocument, title: &str) -> String {
         .filter(|t| t.p_value < LEVEL / document.residual_tests.len().max(1) as f64)
         .map(|t| t.question.as_str())
         .collect();
-    let better = document.fit.iter().find(|f| {
+    let in_free_run = document.form != "innovation";
+    let better = document.fit.iter().filter(|_| in_free_run).find(|f| {
         f.linear_model_percent
             .is_some_and(|l| (100.0 - l) < FOLLOWS_BETTER * (100.0 - f.free_run_percent))
     });

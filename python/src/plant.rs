@@ -1,0 +1,227 @@
+//! Plants in equations.
+
+use innovant::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
+use innovant::physics::{Excitation, Hold, Plant as Core, Point, VariableId, check_units, parse};
+use innovant::report::text::{Style, plant_estimate_text, plant_text};
+use innovant::report::{PlantDocument, plant_fits};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+use crate::arrays::{Samples, columns, matrix, recording, recording_name, samples, slices};
+use crate::errors::raise;
+
+/// A plant in equations.
+#[pyclass(frozen)]
+pub struct Plant {
+    core: Core,
+    point: Point,
+}
+
+fn hold(name: &str) -> PyResult<Hold> {
+    match name {
+        "zero" => Ok(Hold::Zero),
+        "linear" => Ok(Hold::Linear),
+        other => Err(raise(format!("hold is `zero` or `linear`, not `{other}`"))),
+    }
+}
+
+impl Plant {
+    fn names(&self, of: Vec<VariableId>) -> Vec<String> {
+        of.into_iter()
+            .map(|v| self.core.spec.variable(v).column().to_owned())
+            .collect()
+    }
+
+    /// The point with parameters and initial states by name.
+    fn at(&self, parameters: &[(String, f64)], start: &[(String, f64)]) -> PyResult<Point> {
+        let mut point = self.point.clone();
+        let place = |what: &str, names: Vec<String>, name: &String| {
+            names.iter().position(|n| n == name).ok_or_else(|| {
+                raise(format!(
+                    "the plant has no {what} `{name}`; it has {}",
+                    names.join(", ")
+                ))
+            })
+        };
+        for (name, value) in parameters {
+            point.parameters[place("parameter", self.names(self.core.spec.parameters()), name)?] =
+                *value;
+        }
+        for (name, value) in start {
+            point.start[place("state", self.names(self.core.spec.states()), name)?] = Some(*value);
+        }
+        Ok(point)
+    }
+}
+
+#[pymethods]
+impl Plant {
+    /// From a Modelica text, or from what `identify --structure` writes.
+    #[new]
+    fn new(name: &str, text: &str) -> PyResult<Self> {
+        if text.trim_start().starts_with('{') {
+            let document = PlantDocument::parse(name, text).map_err(raise)?;
+            let (core, point) = document.plant().map_err(raise)?;
+            return Ok(Self { core, point });
+        }
+        let spec = parse(text).map_err(|e| raise(e.render(name, text)))?;
+        check_units(&spec).map_err(|e| raise(e.render(name, text)))?;
+        let core = Core::new(spec);
+        Ok(Self {
+            point: core.nominal(),
+            core,
+        })
+    }
+
+    fn text(&self) -> String {
+        plant_text(&self.core)
+    }
+
+    fn inputs(&self) -> Vec<String> {
+        self.names(self.core.spec.inputs())
+    }
+
+    fn outputs(&self) -> Vec<String> {
+        self.names(self.core.spec.outputs())
+    }
+
+    fn states(&self) -> Vec<String> {
+        self.names(self.core.spec.states())
+    }
+
+    /// Names and values of the parameters that may be changed.
+    fn parameters(&self) -> Vec<(String, f64)> {
+        self.names(self.core.spec.parameters())
+            .into_iter()
+            .zip(self.point.parameters.iter().copied())
+            .collect()
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn simulate<'py>(
+        &self,
+        py: Python<'py>,
+        u: Samples<'py>,
+        dt: f64,
+        start_time: f64,
+        parameters: Vec<(String, f64)>,
+        start: Vec<(String, f64)>,
+        hold: &str,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let point = self.at(&parameters, &start)?;
+        let (length, hold) = (u.as_array().nrows(), self::hold(hold)?);
+        let u = columns(&u);
+        let run = py.detach(|| {
+            let inputs = slices(&u);
+            let excitation = Excitation {
+                inputs: &inputs,
+                length,
+                sample_time: dt,
+                start_time,
+                hold,
+            };
+            self.core.simulate(&point, &excitation, None)
+        });
+        Ok(samples(py, &run.map_err(raise)?.outputs))
+    }
+
+    /// Estimates the parameters; gives the document and what is said of it.
+    #[allow(clippy::too_many_arguments)]
+    fn fit(
+        &self,
+        py: Python<'_>,
+        u: Vec<Samples<'_>>,
+        y: Vec<Samples<'_>>,
+        dt: f64,
+        fix: Vec<String>,
+        hold: &str,
+        form: Option<&str>,
+        least_squares: bool,
+    ) -> PyResult<(String, String)> {
+        let names = self.names(self.core.spec.parameters());
+        if let Some(unknown) = fix.iter().find(|f| !names.contains(f)) {
+            return Err(raise(format!(
+                "fix: the plant has no parameter `{unknown}`; it has {}",
+                names.join(", ")
+            )));
+        }
+        let options = EstimateOptions {
+            free: names.iter().map(|n| !fix.contains(n)).collect(),
+            hold: self::hold(hold)?,
+            form: match form {
+                None => None,
+                Some("free run") => Some(Form::FreeRun),
+                Some("innovation") => Some(Form::Innovation),
+                Some(other) => {
+                    return Err(raise(format!(
+                        "form is `free run` or `innovation`, not `{other}`"
+                    )));
+                }
+            },
+            least_squares,
+        };
+        let (inputs, outputs) = (self.inputs(), self.outputs());
+        let mut logs = Vec::new();
+        for (i, (u, y)) in u.iter().zip(&y).enumerate() {
+            let (u, y) = (columns(u), columns(y));
+            logs.push(recording(
+                &recording_name(i, logs.len() + 1),
+                dt,
+                (&inputs, &outputs),
+                (u, y),
+            )?);
+        }
+        let records: Vec<PlantRecording> = logs
+            .iter()
+            .map(|log| PlantRecording {
+                inputs: log.input_data.clone(),
+                outputs: log.output_data.clone(),
+                sample_time: log.sample_time,
+                start_time: log.start_time,
+            })
+            .collect();
+        let start = self.core.with_values(&self.point.parameters);
+        py.detach(|| {
+            let found = estimate(&start, &records, &options).map_err(raise)?;
+            let mut document = PlantDocument::new(&start, &found, options.hold);
+            document.fit = plant_fits(&start, &records, &logs, &found, options.hold);
+            document.sample_time = Some(dt);
+            let samples: usize = logs.iter().map(|l| l.samples()).sum();
+            let title = format!("{} from {samples} samples", start.spec.name);
+            let text = plant_estimate_text(&document, &title, Style::UNICODE);
+            Ok((document.to_json().map_err(raise)?, text))
+        })
+    }
+
+    /// Continuous-time `A, B, C, D` at a state and inputs.
+    #[allow(clippy::type_complexity)]
+    fn linearise<'py>(
+        &self,
+        py: Python<'py>,
+        state: Vec<(String, f64)>,
+        inputs: Vec<f64>,
+    ) -> PyResult<(
+        Bound<'py, PyArray2<f64>>,
+        Bound<'py, PyArray2<f64>>,
+        Bound<'py, PyArray2<f64>>,
+        Bound<'py, PyArray2<f64>>,
+    )> {
+        if inputs.len() != self.inputs().len() {
+            return Err(raise(format!(
+                "{} inputs were given; the plant has {}",
+                inputs.len(),
+                self.inputs().len()
+            )));
+        }
+        let point = self.at(&[], &state)?;
+        let linear = self
+            .core
+            .linearise(&point, &self.core.start(&point), &inputs, 0.0);
+        Ok((
+            matrix(py, &linear.a),
+            matrix(py, &linear.b),
+            matrix(py, &linear.c),
+            matrix(py, &linear.d),
+        ))
+    }
+}
