@@ -115,8 +115,8 @@ fn smooth_sensitivities_are_those_of_differences() {
     let inputs = [u.as_slice()];
     for hold in [Hold::Zero, Hold::Linear] {
         let excitation = excitation(&inputs, 400, 0.02, hold);
-        let error = slope_error(&plant, &excitation, None, &plant.nominal(), 1e-4);
-        assert!(error < 1e-5, "{hold:?}: {error}");
+        let error = slope_error(&plant, &excitation, None, &plant.nominal(), 1e-3);
+        assert!(error < 1e-4, "{hold:?}: {error}");
     }
 }
 
@@ -212,8 +212,8 @@ fn friction_that_reverses_has_the_sensitivities_of_differences() {
     let u: Vec<f64> = (0..300).map(|k| 1.1 * (0.13 * k as f64).sin()).collect();
     let inputs = [u.as_slice()];
     let excitation = excitation(&inputs, 300, 0.01, Hold::Zero);
-    let error = slope_error(&plant, &excitation, None, &plant.nominal(), 1e-6);
-    assert!(error < 2e-3, "{error}");
+    let error = slope_error(&plant, &excitation, None, &plant.nominal(), 1e-4);
+    assert!(error < 3e-2, "{error}");
 }
 
 /// `T x' = u(t - L) - x` from rest, a step: `1 - exp(-(t - L)/T)`, where `L` is no multiple of the sample time.
@@ -274,7 +274,7 @@ fn states_may_be_delayed() {
         } else {
             1.0 - t + 0.5 * (t - 1.0).powi(2)
         };
-        assert!((y - truth).abs() < 1e-6, "{t}: {y} {truth}");
+        assert!((y - truth).abs() < 1e-5, "{t}: {y} {truth}");
     }
 }
 
@@ -302,7 +302,7 @@ fn stiff_plants_take_the_implicit_method() {
         "{:?}",
         run.plan.steps()
     );
-    assert!(run.plan.steps() < 2000, "{}", run.plan.steps());
+    assert!(run.plan.steps() < 4000, "{}", run.plan.steps());
 }
 
 #[test]

@@ -29,6 +29,8 @@ const FIRST_ACCURACY: f64 = 1e-5;
 const ROUGH: u8 = 8;
 /// The explicit method gives way to the implicit one where it would need `2^STIFF` steps in a sample.
 const STIFF: u8 = 7;
+/// Step times rate up to which the explicit method is stable (2.8 for rates that are real).
+const STABLE: f64 = 2.5;
 /// After so many stiff samples the explicit method is tried again.
 const AGAIN: usize = 32;
 /// Half width of the ramp of a switch, as a part of the largest value of its argument: far below what a recording shows.
@@ -68,6 +70,8 @@ pub(super) struct Chooser<'p> {
     half: Vec<Dual<0>>,
     slope: Vec<Dual<0>>,
     end: Vec<Dual<0>>,
+    rates: Vec<f64>,
+    jacobian: Vec<f64>,
     before: Vec<f64>,
     after: Vec<f64>,
 }
@@ -79,6 +83,18 @@ fn worst(error: &[f64], allowed: &[f64]) -> f64 {
         0.0,
         |w, e| if e.is_nan() { f64::INFINITY } else { w.max(e) },
     )
+}
+
+/// Largest sum of a row of a matrix, each state in units of `scale`.
+fn norm(matrix: &[f64], scale: &[f64]) -> f64 {
+    let rows = matrix.chunks(scale.len().max(1)).zip(scale);
+    rows.map(|(row, s)| {
+        row.iter()
+            .zip(scale)
+            .map(|(a, t)| (a * t / s).abs())
+            .sum::<f64>()
+    })
+    .fold(0.0, f64::max)
 }
 
 /// How an attempt at a step ended.
@@ -113,21 +129,28 @@ impl<'p> Chooser<'p> {
             half: room.clone(),
             slope: room.clone(),
             end: room,
+            rates: vec![0.0; n],
+            jacobian: vec![0.0; n * n],
             before: Vec::new(),
             after: Vec::new(),
         }
     }
 
-    /// The steps, and ramps for the arguments seen.
-    pub fn plan(self, tape: &Tape) -> Plan {
-        let width = |(largest, s): (&f64, &SwitchSlots)| match (s.moves, s.of_states) {
+    /// The steps, with the ramps that they resolve; after a rough run those for the arguments seen.
+    pub fn plan(self, tape: &Tape, used: &[f64]) -> Plan {
+        let found = |(largest, s): (&f64, &SwitchSlots)| match (s.moves, s.of_states) {
             (false, _) => 0.0,
             (true, true) => RAMP * largest,
             (true, false) => RAMP_IN_TIME * largest,
         };
+        let widths = if self.rough {
+            self.largest.iter().zip(&tape.switches).map(found).collect()
+        } else {
+            used.to_vec()
+        };
         Plan {
             steps: self.steps,
-            widths: self.largest.iter().zip(&tape.switches).map(width).collect(),
+            widths,
         }
     }
 
@@ -298,6 +321,24 @@ impl<'p> Chooser<'p> {
                     *a = a.max(FIRST_ACCURACY * (next[i].value - x[i].value).abs());
                 }
                 self.error[i] = step * (stages.last_explicit()[i].value - self.end[i].value);
+            }
+            let mut stiffness = stages.stiffness(first, &self.allowed);
+            let switches = self.plant.tape.switches.iter().enumerate();
+            let on_a_ramp = switches
+                .filter(|(_, s)| s.moves)
+                .any(|(i, _)| self.before[i].abs() < field.frame.width[i]);
+            if stiffness.is_nan() || on_a_ramp {
+                // At rest the stages show nothing.
+                field.linearise(
+                    time,
+                    &x.iter().map(|x| x.value).collect::<Vec<_>>(),
+                    &mut self.rates,
+                    &mut self.jacobian,
+                );
+                stiffness = step * norm(&self.jacobian, &self.allowed);
+            }
+            if stiffness > STABLE {
+                return Attempt::Error(f64::INFINITY);
             }
             let indication = worst(&self.error, &self.allowed);
             if indication <= self.trusted {

@@ -404,7 +404,7 @@ impl Plant {
         Ok(Trajectory {
             outputs,
             states,
-            plan: chooser.plan(&self.tape),
+            plan: chooser.plan(&self.tape, &walk.field.frame.width),
         })
     }
 

@@ -51,6 +51,19 @@ impl<const M: usize> Stages<M> {
         &self.slopes[2]
     }
 
+    /// Length of the explicit step times the fastest rate that its stages show: `2 |k3 - k2| / |k2 - k1|`, each state in units
+    /// of `scale`; NaN where nothing moves. Above 2.8 the method is unstable, even where the step is at rest and shows no error:
+    /// its slopes would grow.
+    pub fn stiffness(&self, first: &[Dual<M>], scale: &[f64]) -> f64 {
+        let [k2, k3, ..] = &self.slopes;
+        let (mut change, mut base) = (0.0, 0.0);
+        for (i, scale) in scale.iter().enumerate() {
+            change += ((k3[i].value - k2[i].value) / scale).powi(2);
+            base += ((k2[i].value - first[i].value) / scale).powi(2);
+        }
+        2.0 * (change / base).sqrt()
+    }
+
     /// Difference of the implicit step and the embedded one of order 3, smoothed by the matrix of the last stage, which keeps
     /// stiff parts from counting that the step damps (Hairer and Wanner, equation IV.8.20).
     pub fn embedded_error(&self, length: f64, error: &mut [f64]) {

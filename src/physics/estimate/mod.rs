@@ -21,7 +21,7 @@ pub use problem::{EstimateError, PlantRecording};
 use nalgebra::DMatrix;
 
 use self::deviance::Deviance;
-use self::optimise::{Effort, minimise};
+use self::optimise::{Effort, Range, minimise};
 use self::problem::Problem;
 use super::simulate::{Hold, Plant, Point};
 use crate::noise::Noise;
@@ -117,6 +117,12 @@ const ROUND: Effort = Effort {
 const GLANCE: Effort = Effort {
     iterations: 6,
     settled: 1.0,
+};
+/// Factors of the observer's gain on the way to free run, and the effort at each.
+const WEAKER: [f64; 10] = [0.6, 0.35, 0.2, 0.1, 0.05, 0.025, 0.012, 0.006, 0.003, 0.001];
+const CONTINUED: Effort = Effort {
+    iterations: 6,
+    settled: 0.1,
 };
 /// Draws within the bounds are compared on the first samples of each recording; on short recordings there are more of them.
 const GLANCED_SAMPLES: usize = 1500;
@@ -221,10 +227,32 @@ fn promising_innovation(problem: &Problem, free_run: Option<&Fit>) -> Option<Fit
     observer::fit(problem, Some(&first.point[..problem.nominal().len()]))
 }
 
-/// The fit in free run from the point of the innovation form.
+/// The fit in free run from the point of the innovation form, reached by weakening the observer in steps: with an observer the
+/// likelihood is nearly convex, in free run it may have many summits.
 fn continue_free_run(problem: &Problem, innovation: &Fit) -> Option<Fit> {
-    let mut point = innovation.point[..problem.nominal().len()].to_vec();
-    white_fit(problem, &mut point, ROUND)?;
+    let numbers = problem.nominal().len();
+    let mut point = innovation.point.clone();
+    let mut ranges = problem.ranges();
+    for weaker in WEAKER {
+        for (gain, strong) in point[numbers..]
+            .iter_mut()
+            .zip(&innovation.point[numbers..])
+        {
+            *gain = weaker * strong;
+        }
+        ranges.truncate(numbers);
+        ranges.extend(point[numbers..].iter().map(|&gain| Range {
+            min: gain,
+            max: gain,
+            reach: 0.0,
+        }));
+        let mut objective =
+            Deviance::new(problem, Form::Innovation, Noise::unit(problem.outputs()));
+        objective.noise = objective.rescale(&point)?;
+        minimise(&mut objective, &mut point, &ranges, CONTINUED)?;
+    }
+    point.truncate(numbers);
+    white_fit(problem, &mut point, SEARCH)?;
     coloured_fit(problem, point, innovation.criterion)
 }
 
