@@ -17,6 +17,8 @@ use super::walk::{FINEST, IMPLICIT, Walk};
 pub(super) const STEP_ACCURACY: f64 = 1e-8;
 /// Below this depth errors may double with every halving: they are those of jumps and contacts.
 const RARE: u8 = 8;
+/// ... but not more often than this.
+const MOST_DOUBLED: u8 = 4;
 /// The embedded result of the implicit method is of one order less than the step: its error may be so many times larger.
 const EMBEDDED: f64 = 10.0;
 /// A step whose halves agree to this part of what is allowed says how far they need not be computed.
@@ -245,6 +247,7 @@ impl<'p> Chooser<'p> {
         } else {
             FINEST
         };
+        walk.field.switches(&mut self.before);
         while place < whole {
             while place % (1 << (FINEST - depth)) != 0 {
                 depth += 1;
@@ -274,6 +277,8 @@ impl<'p> Chooser<'p> {
             std::mem::swap(&mut walk.x, &mut walk.next);
             place += size;
             std::mem::swap(&mut walk.first, &mut self.end);
+            // The frame stands at the end of the step that was accepted; after a rejected one it would not.
+            walk.field.switches(&mut self.before);
             walk.field.remember(start.plus(share(place), length).value);
             // A step twice as long has 16 to 32 times the error.
             if matches!(attempt, Attempt::Error(e) if e < 1.0 / 40.0) && depth > coarsest {
@@ -291,7 +296,6 @@ impl<'p> Chooser<'p> {
             Dual::constant(0.5 * step),
             Dual::constant(1.0),
         );
-        walk.field.switches(&mut self.before);
         self.allow(walk, depth);
         let Walk {
             field,
@@ -378,7 +382,7 @@ impl<'p> Chooser<'p> {
     /// Error that a step at this depth may have, for each state.
     fn allow(&mut self, walk: &Walk<0>, depth: u8) {
         // What happens in so small a part of a sample happens rarely; its error does not add up.
-        let rare = 2f64.powi(i32::from(depth.saturating_sub(RARE)));
+        let rare = 2f64.powi(i32::from(depth.saturating_sub(RARE).min(MOST_DOUBLED)));
         for (i, a) in self.allowed.iter_mut().enumerate() {
             let x = walk.x[i].value;
             let moved = self.spread[i].max((x - self.origin[i]).abs());
