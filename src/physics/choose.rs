@@ -186,7 +186,7 @@ impl<'p> Chooser<'p> {
         }
         if self.implicit {
             self.stiff_samples += 1;
-            if self.stiff_samples % AGAIN == 0 {
+            if self.stiff_samples.is_multiple_of(AGAIN) {
                 (self.implicit, self.depth) = (false, STIFF - 2);
             }
         }
@@ -195,7 +195,7 @@ impl<'p> Chooser<'p> {
             walk.begin_part(start, length, k, excitation, parts.len() == 1);
             self.part(walk, start, length)?;
         }
-        let limit = |x: f64| !(x.abs() < DIVERGED);
+        let limit = |x: f64| x.is_nan() || x.abs() >= DIVERGED;
         match walk.x.iter().position(|x| limit(x.value)) {
             Some(i) => Err(self.plant.diverged(walk, excitation.time(k + 1), i)),
             None => Ok(()),
@@ -249,7 +249,7 @@ impl<'p> Chooser<'p> {
         };
         walk.field.switches(&mut self.before);
         while place < whole {
-            while place % (1 << (FINEST - depth)) != 0 {
+            while !place.is_multiple_of(1 << (FINEST - depth)) {
                 depth += 1;
             }
             let size = 1u32 << (FINEST - depth);

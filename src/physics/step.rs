@@ -116,6 +116,10 @@ impl<const M: usize> Stages<M> {
         }
     }
 
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "a state is an element of several lists"
+    )]
     /// The implicit method. False when Newton's iteration does not converge to `accuracy` of each state.
     pub fn implicit(
         &mut self,

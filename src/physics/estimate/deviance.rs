@@ -118,6 +118,10 @@ impl<'p, 'a> Deviance<'p, 'a> {
         self.run(point)
     }
 
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "a direction is a column of every output"
+    )]
     /// Whitened derivatives of the predictions: a column for each free number.
     fn jacobian(&self, runs: &Runs) -> Option<DMatrix<f64>> {
         let problem = self.problem;
@@ -259,7 +263,7 @@ impl Objective for Deviance<'_, '_> {
     fn deviance(&mut self, point: &[f64]) -> Option<f64> {
         let runs = self.run(point)?;
         let deviance = self.noise.deviance(&runs.residual, &self.problem.mask);
-        let runs = std::mem::replace(&mut self.last, Some(runs));
+        let runs = self.last.replace(runs);
         if let Some(runs) = runs {
             self.accepted = Some(runs);
         }
