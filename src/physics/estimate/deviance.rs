@@ -6,7 +6,7 @@ use super::Form;
 use super::optimise::{Objective, RIDGE};
 use super::problem::Problem;
 use crate::noise::{Colour, Noise, Series};
-use crate::physics::simulate::{Direction, Observer, Plan, Trajectory};
+use crate::physics::simulation::{Direction, Observer, Plan, Trajectory};
 
 /// Runs of all recordings at a point.
 #[derive(Clone)]

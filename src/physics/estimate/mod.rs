@@ -23,7 +23,7 @@ use nalgebra::DMatrix;
 use self::deviance::Deviance;
 use self::optimise::{Effort, Range, minimise};
 use self::problem::Problem;
-use super::simulate::{Hold, Plant, Point};
+use super::simulation::{Hold, Plant, Point};
 use crate::noise::Noise;
 
 /// How the predictions of a plant are formed.

@@ -7,8 +7,8 @@ use super::optimise::{Range, minimise};
 use super::problem::Problem;
 use super::{Fit, Form, ROUND, ROUNDS, SEARCH, SETTLED};
 use crate::noise::{Colours, Noise};
-use crate::physics::linearise::LinearPlant;
-use crate::physics::simulate::Excitation;
+use crate::physics::simulation::Excitation;
+use crate::physics::simulation::LinearPlant;
 
 /// Process noise of a sample as a part of the spread of each state, from which gains are computed to start from.
 const DIFFUSION: [f64; 4] = [1e-3, 1e-2, 1e-1, 1.0];

@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use super::EstimateOptions;
 use super::optimise::Range;
 use crate::noise::{Colours, Mask, Noise};
-use crate::physics::simulate::{Excitation, Plan, Plant, Point, SimulationError};
+use crate::physics::simulation::{Excitation, Plan, Plant, Point, SimulationError};
 use crate::physics::spec::VariableKind;
 
 /// A recording of a plant.

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::dual::Dual;
 use super::field::LANES;
-use super::simulate::{Plant, Point};
+use super::plant::{Plant, Point};
 use super::tape::{Frame, Tape};
 
 /// `dx/dt = A dx + B du`, `dy = C dx + D du` about a point, in continuous time.

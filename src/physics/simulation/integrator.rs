@@ -2,7 +2,7 @@
 
 use super::dual::Dual;
 use super::field::Field;
-use super::simulate::{Direction, Excitation, Observer};
+use super::plant::{Direction, Excitation, Observer};
 use super::step::Stages;
 
 /// The finest step is `2^-FINEST` of a sample; a jump is passed with an error of that size.
@@ -11,7 +11,7 @@ pub(super) const FINEST: u8 = 26;
 pub(super) const IMPLICIT: u8 = 0x80;
 
 /// Where a run stands.
-pub(super) struct Walk<'a, const M: usize> {
+pub(super) struct Integrator<'a, const M: usize> {
     pub field: Field<'a, M>,
     pub stages: Stages<M>,
     pub x: Vec<Dual<M>>,
@@ -19,7 +19,7 @@ pub(super) struct Walk<'a, const M: usize> {
     pub next: Vec<Dual<M>>,
 }
 
-impl<const M: usize> Walk<'_, M> {
+impl<const M: usize> Integrator<'_, M> {
     /// Takes the inputs of a sample and evaluates it.
     pub fn sample(&mut self, k: usize, excitation: &Excitation) {
         self.field.begin(k);

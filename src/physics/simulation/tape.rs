@@ -10,8 +10,8 @@
 
 use super::dual::Dual;
 use super::execute::execute;
-use super::expression::{Binary, ExpressionId, Function, Node, VariableId};
-use super::spec::{ModelSpec, Unknown, VariableKind};
+use crate::physics::expression::{Binary, ExpressionId, Function, Node, VariableId};
+use crate::physics::spec::{ModelSpec, Unknown, VariableKind};
 
 /// What an instruction does with its operands.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,9 +8,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::dual::Dual;
 use super::field::Field;
-use super::simulate::{Excitation, Plan, Plant, SimulationError};
+use super::integrator::{FINEST, IMPLICIT, Integrator};
+use super::plant::{Excitation, Plan, Plant, SimulationError};
 use super::tape::{SwitchSlots, Tape};
-use super::walk::{FINEST, IMPLICIT, Walk};
 
 /// Error of one step that is allowed, as a part of how far a state has moved so far. Errors add up along the recording; with
 /// this value the answers of 64 plants of eight kinds are within 1e-6 of their range (`tests/physics_simulate.rs`).
@@ -45,7 +45,7 @@ const RAMP_STEP: f64 = 0.5;
 const DIVERGED: f64 = 1e9;
 
 /// Chooses the steps of a run.
-pub(super) struct Chooser<'p> {
+pub(super) struct StepControl<'p> {
     plant: &'p Plant,
     steps: Vec<u8>,
     depth: u8,
@@ -108,9 +108,9 @@ enum Attempt {
     Switch,
 }
 
-impl<'p> Chooser<'p> {
-    pub fn new(plant: &'p Plant, walk: &Walk<0>, rough: bool) -> Self {
-        let n = walk.x.len();
+impl<'p> StepControl<'p> {
+    pub fn new(plant: &'p Plant, integrator: &Integrator<0>, rough: bool) -> Self {
+        let n = integrator.x.len();
         let room = vec![Dual::constant(0.0); n];
         Self {
             plant,
@@ -118,7 +118,7 @@ impl<'p> Chooser<'p> {
             depth: 0,
             implicit: false,
             stiff_samples: 0,
-            origin: walk.x.iter().map(|x| x.value).collect(),
+            origin: integrator.x.iter().map(|x| x.value).collect(),
             spread: vec![0.0; n],
             first_move: vec![0.0; n],
             allowed: vec![0.0; n],
@@ -159,19 +159,23 @@ impl<'p> Chooser<'p> {
     /// From a sample to the next.
     pub fn advance(
         &mut self,
-        walk: &mut Walk<0>,
+        integrator: &mut Integrator<0>,
         k: usize,
         excitation: &Excitation,
     ) -> Result<(), SimulationError> {
-        for (s, (x, o)) in self.spread.iter_mut().zip(walk.x.iter().zip(&self.origin)) {
+        for (s, (x, o)) in self
+            .spread
+            .iter_mut()
+            .zip(integrator.x.iter().zip(&self.origin))
+        {
             *s = s.max((x.value - o).abs());
         }
-        walk.field.switches(&mut self.before);
+        integrator.field.switches(&mut self.before);
         for (l, z) in self.largest.iter_mut().zip(&self.before) {
             *l = l.max(z.abs()).min(f64::MAX);
         }
         if self.rough {
-            for (w, (l, s)) in walk
+            for (w, (l, s)) in integrator
                 .field
                 .frame
                 .width
@@ -182,7 +186,7 @@ impl<'p> Chooser<'p> {
             }
         }
         if self.spread.contains(&0.0) {
-            self.foresee(walk, k, excitation);
+            self.foresee(integrator, k, excitation);
         }
         if self.implicit {
             self.stiff_samples += 1;
@@ -190,24 +194,24 @@ impl<'p> Chooser<'p> {
                 (self.implicit, self.depth) = (false, STIFF - 2);
             }
         }
-        let parts = walk.parts(k, excitation);
+        let parts = integrator.parts(k, excitation);
         for (start, length) in &parts {
-            walk.begin_part(start, length, k, excitation, parts.len() == 1);
-            self.part(walk, start, length)?;
+            integrator.begin_part(start, length, k, excitation, parts.len() == 1);
+            self.part(integrator, start, length)?;
         }
         let limit = |x: f64| x.is_nan() || x.abs() >= DIVERGED;
-        match walk.x.iter().position(|x| limit(x.value)) {
-            Some(i) => Err(self.plant.diverged(walk, excitation.time(k + 1), i)),
+        match integrator.x.iter().position(|x| limit(x.value)) {
+            Some(i) => Err(self.plant.diverged(integrator, excitation.time(k + 1), i)),
             None => Ok(()),
         }
     }
 
     /// Scale of states that have not moved yet: one linearly implicit step of Euler's over the sample.
-    fn foresee(&mut self, walk: &mut Walk<0>, k: usize, excitation: &Excitation) {
-        let n = walk.x.len();
-        let x: Vec<f64> = walk.x.iter().map(|x| x.value).collect();
+    fn foresee(&mut self, integrator: &mut Integrator<0>, k: usize, excitation: &Excitation) {
+        let n = integrator.x.len();
+        let x: Vec<f64> = integrator.x.iter().map(|x| x.value).collect();
         let (mut f, mut jacobian) = (vec![0.0; n], vec![0.0; n * n]);
-        walk.field.linearise(
+        integrator.field.linearise(
             &Dual::constant(excitation.time(k)),
             &x,
             &mut f,
@@ -226,12 +230,12 @@ impl<'p> Chooser<'p> {
 
     fn part(
         &mut self,
-        walk: &mut Walk<0>,
+        integrator: &mut Integrator<0>,
         start: &Dual<0>,
         length: &Dual<0>,
     ) -> Result<(), SimulationError> {
         let whole = 1u32 << FINEST;
-        let coarsest = (length.value / walk.field.shortest_delay())
+        let coarsest = (length.value / integrator.field.shortest_delay())
             .log2()
             .ceil()
             .clamp(0.0, f64::from(FINEST)) as u8;
@@ -247,7 +251,7 @@ impl<'p> Chooser<'p> {
         } else {
             FINEST
         };
-        walk.field.switches(&mut self.before);
+        integrator.field.switches(&mut self.before);
         while place < whole {
             while !place.is_multiple_of(1 << (FINEST - depth)) {
                 depth += 1;
@@ -255,7 +259,7 @@ impl<'p> Chooser<'p> {
             let size = 1u32 << (FINEST - depth);
             let time = start.plus(share(place), length);
             let step = share(size) * length.value;
-            let attempt = self.attempt(walk, &time, step, depth);
+            let attempt = self.attempt(integrator, &time, step, depth);
             let accepted = matches!(attempt, Attempt::Error(e) if e <= 1.0);
             if !accepted && depth < finest {
                 depth += 1;
@@ -269,17 +273,19 @@ impl<'p> Chooser<'p> {
                 self.implicit = false;
                 continue;
             }
-            if walk.next.iter().any(|x| !x.value.is_finite()) {
-                return Err(self.locate(walk, &time, step));
+            if integrator.next.iter().any(|x| !x.value.is_finite()) {
+                return Err(self.locate(integrator, &time, step));
             }
             self.steps
                 .push(depth | if self.implicit { IMPLICIT } else { 0 });
-            std::mem::swap(&mut walk.x, &mut walk.next);
+            std::mem::swap(&mut integrator.x, &mut integrator.next);
             place += size;
-            std::mem::swap(&mut walk.first, &mut self.end);
+            std::mem::swap(&mut integrator.first, &mut self.end);
             // The frame stands at the end of the step that was accepted; after a rejected one it would not.
-            walk.field.switches(&mut self.before);
-            walk.field.remember(start.plus(share(place), length).value);
+            integrator.field.switches(&mut self.before);
+            integrator
+                .field
+                .remember(start.plus(share(place), length).value);
             // A step twice as long has 16 to 32 times the error.
             if matches!(attempt, Attempt::Error(e) if e < 1.0 / 40.0) && depth > coarsest {
                 depth -= 1;
@@ -289,21 +295,27 @@ impl<'p> Chooser<'p> {
         Ok(())
     }
 
-    /// One step, left in `walk.next`, with the derivative at its end in `self.end`, and its error.
-    fn attempt(&mut self, walk: &mut Walk<0>, time: &Dual<0>, step: f64, depth: u8) -> Attempt {
+    /// One step, left in `integrator.next`, with the derivative at its end in `self.end`, and its error.
+    fn attempt(
+        &mut self,
+        integrator: &mut Integrator<0>,
+        time: &Dual<0>,
+        step: f64,
+        depth: u8,
+    ) -> Attempt {
         let (whole, half, one) = (
             Dual::constant(step),
             Dual::constant(0.5 * step),
             Dual::constant(1.0),
         );
-        self.allow(walk, depth);
-        let Walk {
+        self.allow(integrator, depth);
+        let Integrator {
             field,
             stages,
             x,
             first,
             next,
-        } = walk;
+        } = integrator;
         let end = time.plus(step, &one);
         let error = if self.implicit {
             // A state that has not moved yet has no scale of its own; Newton's iteration needs one.
@@ -373,18 +385,18 @@ impl<'p> Chooser<'p> {
                 error
             }
         };
-        if error <= 1.0 && !self.rough && self.passes_a_switch(&walk.field) {
+        if error <= 1.0 && !self.rough && self.passes_a_switch(&integrator.field) {
             return Attempt::Switch;
         }
         Attempt::Error(error)
     }
 
     /// Error that a step at this depth may have, for each state.
-    fn allow(&mut self, walk: &Walk<0>, depth: u8) {
+    fn allow(&mut self, integrator: &Integrator<0>, depth: u8) {
         // What happens in so small a part of a sample happens rarely; its error does not add up.
         let rare = 2f64.powi(i32::from(depth.saturating_sub(RARE).min(MOST_DOUBLED)));
         for (i, a) in self.allowed.iter_mut().enumerate() {
-            let x = walk.x[i].value;
+            let x = integrator.x[i].value;
             let moved = self.spread[i].max((x - self.origin[i]).abs());
             let moved = if self.spread[i] == 0.0 {
                 moved.max(self.first_move[i])
@@ -412,20 +424,20 @@ impl<'p> Chooser<'p> {
     }
 
     /// Where a step that has no end goes wrong.
-    fn locate(&self, walk: &mut Walk<0>, time: &Dual<0>, step: f64) -> SimulationError {
-        let x = walk.x.clone();
+    fn locate(&self, integrator: &mut Integrator<0>, time: &Dual<0>, step: f64) -> SimulationError {
+        let x = integrator.x.clone();
         let mut point = x.clone();
-        let mut k = walk.first.clone();
+        let mut k = integrator.first.clone();
         for part in [0.0, 0.5, 1.0] {
             for (p, (x, k)) in point.iter_mut().zip(x.iter().zip(&k)) {
                 *p = x.plus(part * step, k);
             }
-            walk.field.evaluate(
+            integrator.field.evaluate(
                 &time.plus(part * step, &Dual::constant(1.0)),
                 &point,
                 &mut k,
             );
-            if let Some(error) = self.plant.not_a_number(walk, time.value) {
+            if let Some(error) = self.plant.not_a_number(integrator, time.value) {
                 return error;
             }
         }
@@ -434,6 +446,6 @@ impl<'p> Chooser<'p> {
             .enumerate()
             .max_by(|a, b| a.1.value.abs().total_cmp(&b.1.value.abs()));
         self.plant
-            .diverged(walk, time.value, worst.map_or(0, |w| w.0))
+            .diverged(integrator, time.value, worst.map_or(0, |w| w.0))
     }
 }

@@ -5,14 +5,14 @@
 
 use nalgebra::DMatrix;
 
-use super::choose::{Chooser, STEP_ACCURACY};
 use super::dual::Dual;
-use super::expression::{ExpressionId, Node};
 use super::field::Field;
-use super::spec::ModelSpec;
+use super::integrator::{IMPLICIT, Integrator};
 use super::step::Stages;
+use super::step_control::{STEP_ACCURACY, StepControl};
 use super::tape::Tape;
-use super::walk::{IMPLICIT, Walk};
+use crate::physics::expression::{ExpressionId, Node};
+use crate::physics::spec::ModelSpec;
 
 /// How inputs behave between samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -236,7 +236,7 @@ impl Plant {
     }
 
     /// The plant simulated with steps whose error is this part of how far a state has moved.
-    pub(super) fn with_accuracy(&self, accuracy: f64) -> Self {
+    pub(in crate::physics) fn with_accuracy(&self, accuracy: f64) -> Self {
         Self {
             accuracy,
             ..self.clone()
@@ -273,11 +273,11 @@ impl Plant {
     ) -> Result<Trajectory, SimulationError> {
         let moving = self.tape.switches.iter().any(|s| s.moves);
         if !moving {
-            return self.simulate_with(point, excitation, observer, &[]);
+            return self.run_choosing(point, excitation, observer, Some(&[]));
         }
         // A first run only finds how large the arguments of switches become.
         let rough = self.run_choosing(point, excitation, observer, None)?;
-        self.simulate_with(point, excitation, observer, &rough.plan.widths)
+        self.run_choosing(point, excitation, observer, Some(&rough.plan.widths))
     }
 
     /// As [`simulate`](Self::simulate) with the ramps of an earlier run: the answer is then smooth in the parameters.
@@ -291,17 +291,7 @@ impl Plant {
         observer: Option<&Observer>,
         plan: &Plan,
     ) -> Result<Trajectory, SimulationError> {
-        self.simulate_with(point, excitation, observer, &plan.widths)
-    }
-
-    fn simulate_with(
-        &self,
-        point: &Point,
-        excitation: &Excitation,
-        observer: Option<&Observer>,
-        widths: &[f64],
-    ) -> Result<Trajectory, SimulationError> {
-        self.run_choosing(point, excitation, observer, Some(widths))
+        self.run_choosing(point, excitation, observer, Some(&plan.widths))
     }
 
     fn check(&self, excitation: &Excitation) -> Result<(), SimulationError> {
@@ -322,13 +312,13 @@ impl Plant {
         })
     }
 
-    fn walk<'a, const M: usize>(
+    fn integrator<'a, const M: usize>(
         &'a self,
         point: &Point,
         excitation: &'a Excitation<'a>,
         widths: &[f64],
         directions: &[Direction],
-    ) -> Walk<'a, M> {
+    ) -> Integrator<'a, M> {
         let mut frame = self.tape.frame::<M>();
         for (width, &known) in frame.width.iter_mut().zip(widths) {
             *width = known;
@@ -361,7 +351,7 @@ impl Plant {
             })
             .collect();
         let room = vec![Dual::constant(0.0); x.len()];
-        Walk {
+        Integrator {
             field,
             stages: Stages::new(x.len()),
             first: room.clone(),
@@ -378,39 +368,39 @@ impl Plant {
         widths: Option<&[f64]>,
     ) -> Result<Trajectory, SimulationError> {
         self.check(excitation)?;
-        let mut walk = self.walk::<0>(point, excitation, widths.unwrap_or(&[]), &[]);
-        let mut chooser = Chooser::new(self, &walk, widths.is_none());
+        let mut integrator = self.integrator::<0>(point, excitation, widths.unwrap_or(&[]), &[]);
+        let mut control = StepControl::new(self, &integrator, widths.is_none());
         let column = || Vec::with_capacity(excitation.length);
         let mut outputs: Vec<Vec<f64>> = self.tape.outputs.iter().map(|_| column()).collect();
         let mut states: Vec<Vec<f64>> = self.tape.states.iter().map(|_| column()).collect();
         for k in 0..excitation.length {
-            walk.sample(k, excitation);
-            for (column, x) in states.iter_mut().zip(&walk.x) {
+            integrator.sample(k, excitation);
+            for (column, x) in states.iter_mut().zip(&integrator.x) {
                 column.push(x.value);
             }
             for (column, &slot) in outputs.iter_mut().zip(&self.tape.outputs) {
-                column.push(walk.field.frame.slot[slot].value);
+                column.push(integrator.field.frame.slot[slot].value);
             }
             if let Some(at) = outputs.iter().position(|o| !o[k].is_finite()) {
                 return Err(self
-                    .not_a_number(&walk, excitation.time(k))
-                    .unwrap_or_else(|| self.diverged(&walk, excitation.time(k), at)));
+                    .not_a_number(&integrator, excitation.time(k))
+                    .unwrap_or_else(|| self.diverged(&integrator, excitation.time(k), at)));
             }
-            walk.correct(k, excitation, observer, &self.tape.outputs, &[]);
+            integrator.correct(k, excitation, observer, &self.tape.outputs, &[]);
             if k + 1 < excitation.length {
-                chooser.advance(&mut walk, k, excitation)?;
+                control.advance(&mut integrator, k, excitation)?;
             }
         }
         Ok(Trajectory {
             outputs,
             states,
-            plan: chooser.plan(&self.tape, &walk.field.frame.width),
+            plan: control.plan(&self.tape, &integrator.field.frame.width),
         })
     }
 
     pub(super) fn diverged<const M: usize>(
         &self,
-        walk: &Walk<M>,
+        integrator: &Integrator<M>,
         time: f64,
         state: usize,
     ) -> SimulationError {
@@ -421,17 +411,17 @@ impl Plant {
         SimulationError::Diverged {
             time,
             state: name.to_owned(),
-            value: walk.x.get(state).map_or(f64::NAN, |x| x.value),
+            value: integrator.x.get(state).map_or(f64::NAN, |x| x.value),
         }
     }
 
     /// What in the frame has no value although its operands have one.
     pub(super) fn not_a_number<const M: usize>(
         &self,
-        walk: &Walk<M>,
+        integrator: &Integrator<M>,
         time: f64,
     ) -> Option<SimulationError> {
-        let at = self.tape.culprit(&walk.field.frame)?;
+        let at = self.tape.culprit(&integrator.field.frame)?;
         let mut values = Vec::new();
         let mut stack: Vec<ExpressionId> = vec![at];
         while let Some(id) = stack.pop() {
@@ -441,7 +431,7 @@ impl Plant {
                 if values.len() < 6 && !values.iter().any(|(n, _)| n == name) {
                     values.push((
                         name.clone(),
-                        walk.field.frame.slot[self.tape.variables[v.index()]].value,
+                        integrator.field.frame.slot[self.tape.variables[v.index()]].value,
                     ));
                 }
             }
@@ -503,28 +493,28 @@ impl Plant {
         plan: &Plan,
         directions: &[Direction],
     ) -> Vec<Vec<Vec<f64>>> {
-        let mut walk = self.walk::<M>(point, excitation, &plan.widths, directions);
+        let mut integrator = self.integrator::<M>(point, excitation, &plan.widths, directions);
         let mut columns = vec![
             vec![Vec::with_capacity(excitation.length); directions.len()];
             self.tape.outputs.len()
         ];
         let mut steps = plan.steps.iter().copied();
-        let mut scale: Vec<f64> = walk.x.iter().map(|x| x.value.abs() * 1e-9).collect();
+        let mut scale: Vec<f64> = integrator.x.iter().map(|x| x.value.abs() * 1e-9).collect();
         for k in 0..excitation.length {
-            walk.sample(k, excitation);
+            integrator.sample(k, excitation);
             for (of_output, &slot) in columns.iter_mut().zip(&self.tape.outputs) {
-                let slope = &walk.field.frame.slot[slot].slope;
+                let slope = &integrator.field.frame.slot[slot].slope;
                 of_output
                     .iter_mut()
                     .zip(slope)
                     .for_each(|(column, &s)| column.push(s));
             }
-            walk.correct(k, excitation, observer, &self.tape.outputs, directions);
+            integrator.correct(k, excitation, observer, &self.tape.outputs, directions);
             if k + 1 < excitation.length {
-                for (s, x) in scale.iter_mut().zip(&walk.x) {
+                for (s, x) in scale.iter_mut().zip(&integrator.x) {
                     *s = s.max(x.value.abs() * STEP_ACCURACY).max(f64::MIN_POSITIVE);
                 }
-                walk.replay(k, excitation, &mut steps, &scale);
+                integrator.replay(k, excitation, &mut steps, &scale);
             }
         }
         columns

@@ -1,8 +1,8 @@
 //! Value and slopes of one instruction of a tape.
 
 use super::dual::{Dual, combined, scaled};
-use super::expression::{Binary, Function};
 use super::tape::{Frame, Instruction, Operation};
+use crate::physics::expression::{Binary, Function};
 
 /// Position on the ramp from 0 (`z` below `-width`) to 1 (above `width`), and its slope: a cubic, whose slope is continuous,
 /// so that few steps integrate it.

@@ -1,0 +1,20 @@
+//! Simulation of a plant with sensitivities, and its linearisation.
+//!
+//! `tape` compiles the equations to instructions, `execute` runs them with derivatives (`dual`), `field` is the derivative of the
+//! states at a point, `step` one step of an integration method, `step_control` the choice of the steps, `integrator` a run.
+
+mod dense;
+mod dual;
+mod execute;
+mod field;
+mod integrator;
+mod linearise;
+mod plant;
+mod step;
+mod step_control;
+mod tape;
+
+pub use linearise::LinearPlant;
+pub use plant::{
+    Direction, Excitation, Hold, Observer, Plan, Plant, Point, SimulationError, Trajectory,
+};
