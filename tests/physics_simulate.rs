@@ -299,9 +299,9 @@ fn stiff_plants_take_the_implicit_method() {
         "{}",
         run.outputs[0][40]
     );
-    assert!(run.plan.implicit_steps() > 0);
-    // The explicit method alone would be unstable in steps longer than 1/700 s.
-    assert!(run.plan.steps() < 20_000, "{}", run.plan.steps());
+    assert!(run.plan.implicit_steps() > run.plan.steps() / 2);
+    // The explicit method alone would be unstable in steps longer than 1/700 s: 28 000 steps.
+    assert!(run.plan.steps() < 4000, "{}", run.plan.steps());
 }
 
 #[test]
@@ -416,5 +416,112 @@ fn simulations_of_another_integrator_are_reproduced() {
                 }
             }
         }
+    }
+}
+
+/// Two inertias on a shaft, driven by a current that settles within a hundredth of a sample; it turns on without end.
+const LINEAR: &str = "model Drive
+  parameter Real J = 0.02; parameter Real I = 0.05; parameter Real k = 30; parameter Real d = 0.02; parameter Real L = 1e-5;
+  input Real u; output Real y; output Real z = w*w;
+  Real i; Real w(start = 1); Real v; Real twist(start = 0.01); Real angle;
+  Real torque = k*twist + d*(w - v);
+equation
+  L*der(i) = u - i + 0.3; J*der(w) = 0.5*i - torque - 0.1*w; I*der(v) = torque EXTRA; der(twist) = w - v; der(angle) = v;
+  y = angle;
+end Drive;";
+
+#[test]
+fn linear_plants_go_by_matrices() {
+    let linear = plant(&LINEAR.replace("EXTRA", ""));
+    let (samples, h) = (300, 0.02);
+    let u = signal(samples, 2.0);
+    // The states, the inputs at the sample and their change in it, and 1.
+    let (j, i, k, d, l) = (0.02, 0.05, 30.0, 0.02, 1e-5);
+    #[rustfmt::skip]
+    let matrix = DMatrix::from_row_slice(8, 8, &[
+        -1.0 / l, 0.0, 0.0, 0.0, 0.0, 1.0 / l, 0.0, 0.3 / l,
+        0.5 / j, (-d - 0.1) / j, d / j, -k / j, 0.0, 0.0, 0.0, 0.0,
+        0.0, d / i, -d / i, k / i, 0.0, 0.0, 0.0, 0.0,
+        0.0, 1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+        0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / h, 0.0,
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    ]);
+    let step = (matrix * h).exp();
+    for hold in [Hold::Zero, Hold::Linear] {
+        let run = linear
+            .simulate(
+                &linear.nominal(),
+                &excitation(&[&u], samples, h, hold),
+                None,
+            )
+            .unwrap();
+        assert_eq!(run.plan.steps(), 0);
+        let mut x = DMatrix::from_column_slice(8, 1, &[0.0, 1.0, 0.0, 0.01, 0.0, 0.0, 0.0, 1.0]);
+        let range = run.outputs[0].iter().fold(0.0f64, |m, y| m.max(y.abs()));
+        for (k, &input) in u.iter().enumerate() {
+            assert!(
+                (run.outputs[0][k] - x[4]).abs() < 1e-10 * range,
+                "{hold:?} {k}"
+            );
+            let speed = x[1];
+            assert!(
+                (run.outputs[1][k] - speed * speed).abs() < 1e-9,
+                "{hold:?} {k}"
+            );
+            let next = u[(k + 1).min(samples - 1)];
+            x[5] = input;
+            x[6] = if hold == Hold::Linear {
+                next - input
+            } else {
+                0.0
+            };
+            x = &step * x;
+        }
+        let slopes = slope_error(
+            &linear,
+            &excitation(&[&u], samples, h, hold),
+            None,
+            &linear.nominal(),
+            1e-5,
+        );
+        assert!(slopes < 1e-6, "{hold:?} {slopes}");
+    }
+    // A term that is not linear takes the steps, and agrees where it is nothing.
+    let general = plant(&LINEAR.replace("EXTRA", "+ 0*w*w"));
+    let inputs: [&[f64]; 1] = [&u];
+    let e = excitation(&inputs, samples, h, Hold::Linear);
+    let (a, b) = (
+        linear.simulate(&linear.nominal(), &e, None).unwrap(),
+        general.simulate(&general.nominal(), &e, None).unwrap(),
+    );
+    assert!(b.plan.steps() > 0);
+    let range = a.outputs[0].iter().fold(0.0f64, |m, y| m.max(y.abs()));
+    for (a, b) in a.outputs[0].iter().zip(&b.outputs[0]) {
+        assert!((a - b).abs() < 1e-6 * range);
+    }
+}
+
+#[test]
+fn held_inputs_may_enter_a_linear_plant_in_any_way() {
+    let plant = plant(
+        "model H parameter Real a = 2; parameter Real b = 3; input Real u; output Real y; Real x;
+         equation der(x) = -a*x + b*u*abs(u) + sign(u - 0.2); y = x; end H;",
+    );
+    let u = signal(100, 1.0);
+    let run = |hold| {
+        plant
+            .simulate(&plant.nominal(), &excitation(&[&u], 100, 0.1, hold), None)
+            .unwrap()
+    };
+    assert_eq!(run(Hold::Zero).plan.steps(), 0);
+    assert!(run(Hold::Linear).plan.steps() > 0);
+    let mut x = 0.0;
+    let pass = (-0.2f64).exp();
+    for (u, y) in u.iter().zip(&run(Hold::Zero).outputs[0]) {
+        assert!((x - y).abs() < 1e-12);
+        let inflow = 3.0 * u * u.abs() + if *u > 0.2 { 1.0 } else { -1.0 };
+        x = pass * x + (1.0 - pass) / 2.0 * inflow;
     }
 }

@@ -17,6 +17,8 @@ pub struct Undetermined {
 const WIDE: f64 = 1.0;
 /// Share of a direction below which a parameter does not belong to it.
 const MEMBER: f64 = 0.15;
+/// A value below this part of the magnitude is as good as 0: no ratio is formed with it.
+const ZERO: f64 = 1e-4;
 /// Relative changes that agree within this are said to be a product or a ratio.
 const EQUAL: f64 = 0.1;
 
@@ -29,7 +31,7 @@ pub(super) fn undetermined(
     let names = problem.names();
     let p = names.len();
     let magnitudes = problem.magnitudes(point);
-    let mut found = Vec::new();
+    let mut found: Vec<Undetermined> = Vec::new();
     let known: Vec<usize> = (0..p).filter(|&i| covariance[(i, i)].is_finite()).collect();
     for i in (0..p).filter(|i| !known.contains(i)) {
         found.push(Undetermined {
@@ -53,8 +55,15 @@ pub(super) fn undetermined(
             continue;
         }
         let direction = eigen.eigenvectors.column(k);
-        // Relative changes along the direction.
-        let change = |a: usize| direction[a] * magnitudes[known[a]] / nonzero(point[known[a]]);
+        // Relative changes along the direction; of a value near 0, its change in units of its magnitude.
+        let change = |a: usize| {
+            let (value, magnitude) = (point[known[a]], magnitudes[known[a]]);
+            if value.abs() > ZERO * magnitude {
+                direction[a] * magnitude / value
+            } else {
+                direction[a]
+            }
+        };
         let most = (0..known.len())
             .map(|a| change(a).abs())
             .fold(0.0, f64::max);
@@ -88,17 +97,15 @@ pub(super) fn undetermined(
                 list(&who)
             ),
         };
-        found.push(Undetermined {
-            parameters: who,
-            message,
-        });
+        // Several directions may concern the same parameters.
+        if found.iter().all(|f| f.parameters != who) {
+            found.push(Undetermined {
+                parameters: who,
+                message,
+            });
+        }
     }
     found
-}
-
-/// The value, or a very small one for 0.
-fn nonzero(value: f64) -> f64 {
-    if value == 0.0 { 1e-300 } else { value }
 }
 
 fn list(names: &[String]) -> String {

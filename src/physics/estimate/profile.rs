@@ -53,12 +53,15 @@ pub(super) fn interval(
         return ((value - reach).max(own.min), (value + reach).min(own.max));
     }
     let base = objective.deviance(&fit.point).unwrap_or(fit.deviance);
+    // Where the covariance says that the others go when the parameter moves.
+    let line = |to: f64| -> Vec<f64> {
+        let part = (to - value) / covariance[(i, i)];
+        let others = (0..fit.point.len()).map(|j| fit.point[j] + part * covariance[(j, i)]);
+        others.collect()
+    };
     let mut side = |sign: f64| {
         let mut at = value + sign * LEVEL.sqrt() * std;
-        // Where the covariance says that the others go with it.
-        let along: Vec<f64> = (0..fit.point.len())
-            .map(|j| fit.point[j] + covariance[(j, i)] * sign * LEVEL.sqrt() / std)
-            .collect();
+        let along = line(at);
         let inside = along
             .iter()
             .zip(&ranges)
@@ -73,7 +76,15 @@ pub(super) fn interval(
         let mut best = at;
         for attempt in 0..TRIES {
             let tried = at.clamp(own.min, own.max);
-            let mut point = fit.point.clone();
+            // From there the other numbers are nearly at their summit; from the estimate they would be far from it.
+            let mut point = line(tried);
+            for (p, (range, fitted)) in point.iter_mut().zip(ranges.iter().zip(&fit.point)) {
+                *p = if p.is_finite() {
+                    p.clamp(range.min, range.max)
+                } else {
+                    *fitted
+                };
+            }
             point[i] = tried;
             let mut held = ranges.clone();
             held[i] = Range {

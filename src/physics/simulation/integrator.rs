@@ -2,9 +2,12 @@
 
 use super::dual::Dual;
 use super::field::Field;
+use super::linear::Propagator;
 use super::plant::{Direction, Excitation, Observer};
 use super::step::Stages;
 
+/// Stages of a run with slopes are solved to this part of their move: below the error of any step.
+const REPLAYED: f64 = 1e-9;
 /// The finest step is `2^-FINEST` of a sample; a jump is passed with an error of that size.
 pub(super) const FINEST: u8 = 26;
 /// Bit of a step that says that it is implicit.
@@ -17,6 +20,8 @@ pub(super) struct Integrator<'a, const M: usize> {
     pub x: Vec<Dual<M>>,
     pub first: Vec<Dual<M>>,
     pub next: Vec<Dual<M>>,
+    /// For a plant that is linear in its states.
+    pub propagator: Option<Propagator<M>>,
 }
 
 impl<const M: usize> Integrator<'_, M> {
@@ -78,6 +83,22 @@ impl<const M: usize> Integrator<'_, M> {
             .collect()
     }
 
+    /// To the next sample by matrices, where the plant is linear in its states; false where it is not.
+    pub fn propagate(&mut self, k: usize, excitation: &Excitation) -> bool {
+        let Some(propagator) = &mut self.propagator else {
+            return false;
+        };
+        let (x, room) = (&mut self.x, &mut self.next);
+        propagator.advance(
+            &mut self.field,
+            excitation.time(k + 1),
+            x,
+            &self.first,
+            room,
+        );
+        true
+    }
+
     /// Begins a part of a sample.
     pub fn begin_part(
         &mut self,
@@ -129,6 +150,7 @@ impl<const M: usize> Integrator<'_, M> {
                         &part,
                         &self.x,
                         scale,
+                        REPLAYED,
                         &mut self.next,
                     );
                 }

@@ -1,13 +1,15 @@
 //! Simulation of a plant with sensitivities, and its linearisation.
 //!
 //! `tape` compiles the equations to instructions, `execute` runs them with derivatives (`dual`), `field` is the derivative of the
-//! states at a point, `step` one step of an integration method, `step_control` the choice of the steps, `integrator` a run.
+//! states at a point, `step` one step of an integration method, `step_control` the choice of the steps, `integrator` a run; `linear`
+//! takes plants that are linear in their states from sample to sample by matrices.
 
 mod dense;
 mod dual;
 mod execute;
 mod field;
 mod integrator;
+mod linear;
 mod linearise;
 mod plant;
 mod step;

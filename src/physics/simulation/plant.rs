@@ -8,6 +8,7 @@ use nalgebra::DMatrix;
 use super::dual::Dual;
 use super::field::Field;
 use super::integrator::{IMPLICIT, Integrator};
+use super::linear::{Linearity, Propagator};
 use super::step::Stages;
 use super::step_control::{STEP_ACCURACY, StepControl};
 use super::tape::Tape;
@@ -189,12 +190,16 @@ fn said(values: &[(String, f64)]) -> String {
     format!("; there {}", list.join(", "))
 }
 
+/// A run that leaves this has diverged.
+const DIVERGED: f64 = 1e9;
+
 /// A plant that can be simulated.
 #[derive(Debug, Clone)]
 pub struct Plant {
     /// Its equations.
     pub spec: ModelSpec,
     pub(super) tape: Tape,
+    linearity: Linearity,
     /// Values of the parameters, where they are not those of the text.
     nominal: Option<Vec<f64>>,
     /// Error of a step as a part of how far a state has moved.
@@ -205,9 +210,16 @@ impl Plant {
     /// Compiles the equations.
     pub fn new(spec: ModelSpec) -> Self {
         let tape = Tape::new(&spec);
+        let smooth = tape.delays.is_empty() && tape.switches.iter().all(|s| !s.moves);
+        let linearity = if smooth {
+            Linearity::of(&spec)
+        } else {
+            Linearity::No
+        };
         Self {
             spec,
             tape,
+            linearity,
             nominal: None,
             accuracy: STEP_ACCURACY,
         }
@@ -351,7 +363,13 @@ impl Plant {
             })
             .collect();
         let room = vec![Dual::constant(0.0); x.len()];
+        let mut field = field;
+        let propagator = self
+            .linearity
+            .holds(excitation.hold)
+            .then(|| Propagator::new(&mut field, x.len(), excitation.sample_time, excitation.hold));
         Integrator {
+            propagator,
             field,
             stages: Stages::new(x.len()),
             first: room.clone(),
@@ -388,7 +406,10 @@ impl Plant {
             }
             integrator.correct(k, excitation, observer, &self.tape.outputs, &[]);
             if k + 1 < excitation.length {
-                control.advance(&mut integrator, k, excitation)?;
+                if !integrator.propagate(k, excitation) {
+                    control.advance(&mut integrator, k, excitation)?;
+                }
+                self.bounded(&integrator, excitation.time(k + 1))?;
             }
         }
         Ok(Trajectory {
@@ -396,6 +417,15 @@ impl Plant {
             states,
             plan: control.plan(&self.tape, &integrator.field.frame.width),
         })
+    }
+
+    /// Whether the states are within every bound.
+    fn bounded(&self, integrator: &Integrator<0>, time: f64) -> Result<(), SimulationError> {
+        let beyond = |x: f64| x.is_nan() || x.abs() >= DIVERGED;
+        match integrator.x.iter().position(|x| beyond(x.value)) {
+            Some(i) => Err(self.diverged(integrator, time, i)),
+            None => Ok(()),
+        }
     }
 
     pub(super) fn diverged<const M: usize>(
@@ -510,7 +540,7 @@ impl Plant {
                     .for_each(|(column, &s)| column.push(s));
             }
             integrator.correct(k, excitation, observer, &self.tape.outputs, directions);
-            if k + 1 < excitation.length {
+            if k + 1 < excitation.length && !integrator.propagate(k, excitation) {
                 for (s, x) in scale.iter_mut().zip(&integrator.x) {
                     *s = s.max(x.value.abs() * STEP_ACCURACY).max(f64::MIN_POSITIVE);
                 }

@@ -120,7 +120,8 @@ impl<const M: usize> Stages<M> {
         clippy::needless_range_loop,
         reason = "a state is an element of several lists"
     )]
-    /// The implicit method. False when Newton's iteration does not converge to `accuracy` of each state.
+    /// The implicit method. False when Newton's iteration does not converge to `accuracy` of each state, or to the part
+    /// `relative` of the move of the state in the stage where that is more.
     pub fn implicit(
         &mut self,
         field: &mut Field<M>,
@@ -128,6 +129,7 @@ impl<const M: usize> Stages<M> {
         length: &Dual<M>,
         x: &[Dual<M>],
         accuracy: &[f64],
+        relative: f64,
         result: &mut [Dual<M>],
     ) -> bool {
         let n = x.len();
@@ -149,7 +151,7 @@ impl<const M: usize> Stages<M> {
                     _ => base + step * self.slopes[stage - 1][i].value,
                 };
             }
-            if !self.newton.solve(field, &at, step, accuracy) {
+            if !self.newton.solve(field, &at, step, accuracy, relative) {
                 return false;
             }
             let Newton {
@@ -226,20 +228,26 @@ impl Newton {
         }
     }
 
-    /// Solves from the guess in `z`. False when it does not converge to `accuracy` of each state.
+    /// Solves from the guess in `z`. False when it does not converge to `accuracy` of each state, or to the part `relative` of
+    /// its move where that is more.
     fn solve<const M: usize>(
         &mut self,
         field: &mut Field<M>,
         at: &Dual<M>,
         step: f64,
         accuracy: &[f64],
+        relative: f64,
     ) -> bool {
         let n = self.base.len();
         let size = |of: &[f64]| {
-            of.iter()
-                .zip(accuracy)
-                .map(|(r, a)| (r / a).abs())
-                .fold(0.0, f64::max)
+            let each = of.iter().zip(accuracy);
+            each.fold(0.0, |worst: f64, (r, a)| {
+                if r.is_finite() {
+                    worst.max((r / a).abs().min(f64::MAX))
+                } else {
+                    f64::INFINITY
+                }
+            })
         };
         let mut before = f64::INFINITY;
         self.taken.fill(0.0);
@@ -273,7 +281,11 @@ impl Newton {
             for (t, z) in self.taken.iter().zip(&mut self.z) {
                 *z += t;
             }
-            if size(&self.taken) <= STAGE_ACCURACY {
+            let rest = self.taken.iter().zip(accuracy).enumerate();
+            let solved = |(i, (t, a)): (usize, (&f64, &f64))| {
+                t.abs() <= STAGE_ACCURACY * a.max(relative * (self.z[i] - self.base[i]).abs())
+            };
+            if rest.map(solved).all(|s| s) {
                 return true;
             }
         }

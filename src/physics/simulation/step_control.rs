@@ -27,6 +27,8 @@ const TRUSTED: f64 = 0.5;
 const OF_LEVEL: f64 = 1e-5;
 /// Error of a step from rest, as a part of the step: what starts to move has no scale yet.
 const FIRST_ACCURACY: f64 = 1e-5;
+/// Steps of Euler's that foresee how far a state moves in its first sample.
+const FORESEEN: usize = 4;
 /// The finest step of the run that only finds the size of the arguments of switches.
 const ROUGH: u8 = 8;
 /// The explicit method gives way to the implicit one where it would need `2^STIFF` steps in a sample.
@@ -41,8 +43,6 @@ const RAMP: f64 = 1e-5;
 const RAMP_IN_TIME: f64 = 1e-7;
 /// A ramp is passed in steps of at most this part of its half width.
 const RAMP_STEP: f64 = 0.5;
-/// A run that leaves this has diverged.
-const DIVERGED: f64 = 1e9;
 
 /// Chooses the steps of a run.
 pub(super) struct StepControl<'p> {
@@ -199,31 +199,29 @@ impl<'p> StepControl<'p> {
             integrator.begin_part(start, length, k, excitation, parts.len() == 1);
             self.part(integrator, start, length)?;
         }
-        let limit = |x: f64| x.is_nan() || x.abs() >= DIVERGED;
-        match integrator.x.iter().position(|x| limit(x.value)) {
-            Some(i) => Err(self.plant.diverged(integrator, excitation.time(k + 1), i)),
-            None => Ok(()),
-        }
+        Ok(())
     }
 
-    /// Scale of states that have not moved yet: one linearly implicit step of Euler's over the sample.
+    /// Scale of states that have not moved yet: a few linearly implicit steps of Euler's over the sample. One would not reach
+    /// the states that move only when others have.
     fn foresee(&mut self, integrator: &mut Integrator<0>, k: usize, excitation: &Excitation) {
         let n = integrator.x.len();
-        let x: Vec<f64> = integrator.x.iter().map(|x| x.value).collect();
-        let (mut f, mut jacobian) = (vec![0.0; n], vec![0.0; n * n]);
-        integrator.field.linearise(
-            &Dual::constant(excitation.time(k)),
-            &x,
-            &mut f,
-            &mut jacobian,
-        );
-        let h = excitation.sample_time;
-        let matrix = DMatrix::from_fn(n, n, |i, j| f64::from(i == j) - h * jacobian[i * n + j]);
-        let moved = matrix
-            .lu()
-            .solve(&DVector::from_iterator(n, f.iter().map(|f| h * f)));
-        for (i, first) in self.first_move.iter_mut().enumerate() {
-            let moved = moved.as_ref().map_or(0.0, |m| m[i].abs());
+        let start: Vec<f64> = integrator.x.iter().map(|x| x.value).collect();
+        let (mut x, mut f, mut jacobian) = (start.clone(), vec![0.0; n], vec![0.0; n * n]);
+        let h = excitation.sample_time / FORESEEN as f64;
+        for part in 0..FORESEEN {
+            let time = excitation.time(k) + part as f64 * h;
+            let time = Dual::constant(time);
+            integrator.field.linearise(&time, &x, &mut f, &mut jacobian);
+            let matrix = DMatrix::from_fn(n, n, |i, j| f64::from(i == j) - h * jacobian[i * n + j]);
+            let right = DVector::from_iterator(n, f.iter().map(|f| h * f));
+            let Some(moved) = matrix.lu().solve(&right) else {
+                break;
+            };
+            x.iter_mut().zip(&moved).for_each(|(x, m)| *x += m);
+        }
+        for (first, (x, start)) in self.first_move.iter_mut().zip(x.iter().zip(&start)) {
+            let moved = (x - start).abs();
             *first = if moved.is_finite() { moved } else { 0.0 };
         }
     }
@@ -315,27 +313,22 @@ impl<'p> StepControl<'p> {
             x,
             first,
             next,
+            ..
         } = integrator;
         let end = time.plus(step, &one);
         let error = if self.implicit {
-            // A state that has not moved yet has no scale of its own; Newton's iteration needs one.
-            for (a, f) in self.allowed.iter_mut().zip(&*first) {
-                *a = a.max(self.tolerance * (f.value * step).abs()).max(1e-300);
-            }
-            if !stages.implicit(field, time, &whole, x, &self.allowed, next) {
+            if !stages.implicit(field, time, &whole, x, &self.allowed, self.tolerance, next) {
                 return Attempt::Error(f64::INFINITY);
             }
+            self.allow_moved(x, next);
             stages.embedded_error(step, &mut self.error);
             field.evaluate(&end, next, &mut self.end);
             worst(&self.error, &self.allowed) / EMBEDDED
         } else {
             stages.explicit(field, time, &whole, x, first, next);
             field.evaluate(&end, next, &mut self.end);
-            for (i, a) in self.allowed.iter_mut().enumerate() {
-                *a = a.max(self.tolerance * (next[i].value - self.origin[i]).abs());
-                if self.spread[i] == 0.0 {
-                    *a = a.max(FIRST_ACCURACY * (next[i].value - x[i].value).abs());
-                }
+            self.allow_moved(x, next);
+            for i in 0..x.len() {
                 self.error[i] = step * (stages.last_explicit()[i].value - self.end[i].value);
             }
             let mut stiffness = stages.stiffness(first, &self.allowed);
@@ -408,6 +401,16 @@ impl<'p> StepControl<'p> {
                 * moved
                     .max(OF_LEVEL * x.abs())
                     .max(f64::MIN_POSITIVE / self.tolerance);
+        }
+    }
+
+    /// The same once the end of the step is known: it counts as moved, and what starts to move has no other scale.
+    fn allow_moved(&mut self, x: &[Dual<0>], next: &[Dual<0>]) {
+        for (i, a) in self.allowed.iter_mut().enumerate() {
+            *a = a.max(self.tolerance * (next[i].value - self.origin[i]).abs());
+            if self.spread[i] == 0.0 {
+                *a = a.max(FIRST_ACCURACY * (next[i].value - x[i].value).abs());
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! A plant in equations, for people: what was read, and what was estimated.
 
-use super::number::{percent, significant, with_std};
+use super::number::{percent, probability, significant, with_std};
 use super::table::Table;
 use super::{Style, wrapped};
 use crate::physics::{ModelSpec, Plant, Unknown, VariableKind};
@@ -234,7 +234,7 @@ pub fn plant_estimate_text(document: &PlantDocument, title: &str, style: Style) 
             question.to_owned(),
             significant(t.statistic, 4),
             t.degrees.to_string(),
-            significant(t.p_value, 2),
+            probability(t.p_value),
         ]);
     }
     out += &table.lines();
