@@ -486,7 +486,8 @@ fn linear_plants_go_by_matrices() {
             &linear.nominal(),
             1e-5,
         );
-        assert!(slopes < 1e-6, "{hold:?} {slopes}");
+        // The start of the current moves the angle so little that differences see it to 1e-4.
+        assert!(slopes < 3e-4, "{hold:?} {slopes}");
     }
     // A term that is not linear takes the steps, and agrees where it is nothing.
     let general = plant(&LINEAR.replace("EXTRA", "+ 0*w*w"));

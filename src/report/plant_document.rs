@@ -131,6 +131,10 @@ pub struct FitDocument {
     pub free_run_percent: f64,
     /// Root mean square of the error.
     pub rms_error: f64,
+    /// The same percentage on the last third of each recording, of parameters and initial states that were estimated from the
+    /// first two thirds; null where these are too short.
+    #[serde(default)]
+    pub held_out_percent: Option<f64>,
     /// The same percentage with the values of the text.
     #[serde(default)]
     pub text_percent: Option<f64>,

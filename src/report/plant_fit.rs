@@ -3,7 +3,7 @@
 use super::plant_document::FitDocument;
 use crate::identify::{Options, identify};
 use crate::log::Log;
-use crate::physics::estimate::{PlantEstimate, PlantRecording};
+use crate::physics::estimate::{HELD_OUT_FROM, PlantEstimate, PlantRecording};
 use crate::physics::{Excitation, Hold, Plant};
 
 /// `100 (1 - |y - s| / |y - mean y|)` over several recordings, and the root mean square of the error.
@@ -67,17 +67,28 @@ pub fn plant_fits(
             let of_linear = linear
                 .as_ref()
                 .map(|(_, runs)| runs.iter().map(|r| r[o].as_slice()));
+            let rest = |runs: &[Vec<f64>]| {
+                let pairs = measured(o).zip(runs.iter().skip(o).step_by(l));
+                let later = pairs.map(|(y, s)| (last_part(y), last_part(s)));
+                fit(&later.collect::<Vec<_>>()).0
+            };
             FitDocument {
                 output: plant.spec.variable(outputs[o]).column().to_owned(),
                 free_run_percent: percent,
                 rms_error: rms,
                 text_percent: of_text.map(|t| fit(&measured(o).zip(t).collect::<Vec<_>>()).0),
+                held_out_percent: estimate.held_out.as_deref().map(rest),
                 linear_model_percent: of_linear
                     .map(|t| fit(&measured(o).zip(t).collect::<Vec<_>>()).0),
                 linear_model_order: linear.as_ref().map(|(order, _)| *order),
             }
         })
         .collect()
+}
+
+/// What the held-out fit is judged on.
+fn last_part(series: &[f64]) -> &[f64] {
+    &series[(HELD_OUT_FROM * series.len() as f64) as usize..]
 }
 
 /// Order and free runs of the linear model that is identified from the same recordings.

@@ -94,6 +94,8 @@ pub struct PlantEstimate {
     pub simulated: Vec<Vec<f64>>,
     /// Whitened residuals: a column for each recording and output.
     pub innovations: Vec<Vec<f64>>,
+    /// Free run of parameters and initial states that were estimated from the first [`HELD_OUT_FROM`] of each recording only.
+    pub held_out: Option<Vec<Vec<f64>>>,
     /// What the recordings do not determine.
     pub undetermined: Vec<Undetermined>,
     /// Tests of the residuals.
@@ -124,6 +126,9 @@ const CONTINUED: Effort = Effort {
     iterations: 6,
     settled: 0.1,
 };
+/// First part of the recordings that is fitted when it is made to grow, and the factor by which it grows.
+const GROWN_FROM: f64 = 0.05;
+const GROWTH: f64 = 1.3;
 /// Draws within the bounds are compared on the first samples of each recording; on short recordings there are more of them.
 const GLANCED_SAMPLES: usize = 1500;
 const GLANCED_VALUES: usize = 12_000;
@@ -132,9 +137,11 @@ const MOST_DRAWS: usize = 10;
 /// Deviances that differ by less are those of one summit.
 const SAME_SUMMIT: f64 = 1.0;
 /// How many of them are searched to the end.
-const KEPT_DRAWS: usize = 2;
+const KEPT_DRAWS: usize = 3;
 /// A criterion that is larger than that of a rival by this is not improved further.
 const HOPELESS: f64 = 200.0;
+/// Part of each recording that the held-out fit is estimated from; the rest is judged.
+pub const HELD_OUT_FROM: f64 = 2.0 / 3.0;
 /// Level at which residuals are said to depend on the inputs.
 const NOISE: f64 = 1e-3;
 
@@ -160,7 +167,7 @@ pub fn estimate(
             // In free run the errors of such a plant grow: it comes second, from where the observer has led.
             let innovation = observer::fit(&problem, None);
             let free_run = match &innovation {
-                Some(fit) => continue_free_run(&problem, fit),
+                Some(fit) => improved_near(&problem, continue_free_run(&problem, fit), fit),
                 None => fit_free_run(&problem),
             };
             (free_run, innovation)
@@ -214,7 +221,7 @@ fn promising_innovation(problem: &Problem, free_run: Option<&Fit>) -> Option<Fit
     let Some(free_run) = free_run else {
         return observer::fit(problem, None);
     };
-    let recordings = problem.first_parts(GLANCED_SAMPLES);
+    let recordings = problem.parts(|samples| samples.min(GLANCED_SAMPLES));
     let short = problem.with_recordings(&recordings);
     let first = observer::fit(&short, Some(&free_run.point))?;
     let residual =
@@ -256,8 +263,23 @@ fn continue_free_run(problem: &Problem, innovation: &Fit) -> Option<Fit> {
     coloured_fit(problem, point, innovation.criterion)
 }
 
+/// The better of a fit in free run and of one to growing parts of the recordings, where the innovation form is only a little
+/// better than the first: another summit of the free run may be the highest.
+fn improved_near(problem: &Problem, free_run: Option<Fit>, innovation: &Fit) -> Option<Fit> {
+    let ahead = free_run.as_ref()?.criterion - innovation.criterion;
+    if !(0.0..HOPELESS).contains(&ahead) {
+        return free_run;
+    }
+    let grown = grown_fit(problem)
+        .and_then(|(_, point)| coloured_fit(problem, point, innovation.criterion));
+    [free_run, grown]
+        .into_iter()
+        .flatten()
+        .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+}
+
 /// The fit in free run from the values of the text and, unless that leaves white noise that does not depend on the inputs, from
-/// draws within the bounds. Summits are compared under white noise: a coloured noise model would absorb what a wrong one leaves.
+/// the values of the text less one term each, and from draws within the bounds. Summits are compared under white noise: a coloured noise model would absorb what a wrong one leaves.
 fn fit_free_run(problem: &Problem) -> Option<Fit> {
     let mut point = problem.nominal();
     let mut highest = white_fit(problem, &mut point, SEARCH).unwrap_or(f64::INFINITY);
@@ -269,14 +291,23 @@ fn fit_free_run(problem: &Problem) -> Option<Fit> {
     if best.as_ref().is_some_and(|fit| leaves_noise(problem, fit)) {
         return best;
     }
+    if let Some((deviance, point)) = grown_fit(problem)
+        && deviance < highest - SAME_SUMMIT
+    {
+        highest = deviance;
+        best = coloured_fit(problem, point, f64::INFINITY).or(best);
+        if best.as_ref().is_some_and(|fit| leaves_noise(problem, fit)) {
+            return best;
+        }
+    }
     // Draws are compared on the first part of the recordings.
-    let recordings = problem.first_parts(GLANCED_SAMPLES);
+    let recordings = problem.parts(|samples| samples.min(GLANCED_SAMPLES));
     let short = problem.with_recordings(&recordings);
     let mut tried: Vec<(f64, Vec<f64>)> = Vec::new();
     let draws = (GLANCED_VALUES / short.count().max(1)).clamp(LEAST_DRAWS, MOST_DRAWS);
-    for draw in problem.draws(draws) {
-        let mut point = draw;
-        if let Some(deviance) = white_fit(&short, &mut point, GLANCE) {
+    let draws = problem.draws(draws).into_iter().map(|d| (d, None));
+    for (mut point, held) in problem.without_terms().into_iter().chain(draws) {
+        if let Some(deviance) = white_fit_holding(&short, &mut point, GLANCE, held) {
             tried.push((deviance, point));
         }
     }
@@ -291,6 +322,23 @@ fn fit_free_run(problem: &Problem) -> Option<Fit> {
         }
     }
     best
+}
+
+/// The fit under white noise to longer and longer first parts of the recordings, each from the one before, with its deviance. On
+/// a short part the likelihood has few summits; where small errors grow along a recording, a long one has many.
+fn grown_fit(problem: &Problem) -> Option<(f64, Vec<f64>)> {
+    let mut point = problem.nominal();
+    let mut part = GROWN_FROM;
+    while part < 1.0 {
+        let recordings = problem.parts(|samples| (part * samples as f64) as usize);
+        let short = problem.with_recordings(&recordings);
+        if short.count() > 2 * point.len() {
+            white_fit(&short, &mut point, CONTINUED)?;
+        }
+        part *= GROWTH;
+    }
+    let deviance = white_fit(problem, &mut point, SEARCH)?;
+    Some((deviance, point))
 }
 
 /// Whether the residuals of a fit are white and pass the tests. Coloured noise may hide what another summit explains.
@@ -320,12 +368,7 @@ fn coloured_fit(problem: &Problem, mut point: Vec<f64>, rival: f64) -> Option<Fi
     let mut last = f64::INFINITY;
     for _ in 0..ROUNDS {
         let residual = objective.residual(&point)?;
-        objective.noise = Noise::estimate(
-            &residual,
-            problem.outputs(),
-            &problem.mask,
-            problem.colours(),
-        );
+        objective.noise = problem.noise(&residual);
         let deviance = minimise(&mut objective, &mut point, &problem.ranges(), ROUND)?;
         let now = problem.criterion(deviance, objective.noise.len(), 0);
         if last - deviance < SETTLED || now > rival + HOPELESS {
@@ -346,10 +389,28 @@ fn coloured_fit(problem: &Problem, mut point: Vec<f64>, rival: f64) -> Option<Fi
 
 /// Improves a point under white noise whose size is that of what is left; gives the deviance with the size at the end.
 fn white_fit(problem: &Problem, point: &mut Vec<f64>, effort: Effort) -> Option<f64> {
+    white_fit_holding(problem, point, effort, None)
+}
+
+/// The same with one of the parameters held.
+fn white_fit_holding(
+    problem: &Problem,
+    point: &mut Vec<f64>,
+    effort: Effort,
+    held: Option<usize>,
+) -> Option<f64> {
     let mut objective = Deviance::new(problem, Form::FreeRun, Noise::unit(problem.outputs()));
+    let mut ranges = problem.ranges();
+    if let Some(i) = held {
+        ranges[i] = Range {
+            min: point[i],
+            max: point[i],
+            reach: 0.0,
+        };
+    }
     for _ in 0..2 {
         objective.noise = objective.rescale(point)?;
-        minimise(&mut objective, point, &problem.ranges(), effort)?;
+        minimise(&mut objective, point, &ranges, effort)?;
     }
     let residual = objective.residual(point)?;
     Some(
@@ -393,6 +454,7 @@ fn finish(problem: &Problem, fit: Fit, other_criterion: Option<f64>) -> PlantEst
         .simulated(&fit.point)
         .unwrap_or_default();
     let tests = residual_tests(problem, &fit, &innovations, &simulated);
+    let held_out = held_out(problem, &fit);
     PlantEstimate {
         points,
         parameters,
@@ -414,9 +476,26 @@ fn finish(problem: &Problem, fit: Fit, other_criterion: Option<f64>) -> PlantEst
         ),
         simulated,
         innovations,
+        held_out,
         undetermined,
         tests,
     }
+}
+
+/// Free run over the whole recordings of a fit to their first part, in the same form, from the fit to all.
+fn held_out(problem: &Problem, fit: &Fit) -> Option<Vec<Vec<f64>>> {
+    let part = |samples: usize| (HELD_OUT_FROM * samples as f64) as usize;
+    let recordings = problem.parts(part);
+    let short = problem.with_recordings(&recordings);
+    let numbers = problem.nominal().len();
+    if short.count() <= 2 * fit.point.len() {
+        return None;
+    }
+    let again = match fit.form {
+        Form::FreeRun => coloured_fit(&short, fit.point.clone(), f64::INFINITY)?,
+        Form::Innovation => observer::fit(&short, Some(&fit.point[..numbers]))?,
+    };
+    Deviance::new(problem, Form::FreeRun, again.noise).simulated(&again.point[..numbers])
 }
 
 /// Tests of the residuals: are they white, and no function of the inputs? What the parameters could do is taken out of neither

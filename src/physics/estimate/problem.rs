@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng};
 
 use super::EstimateOptions;
 use super::optimise::Range;
-use crate::noise::{Colours, Mask, Noise};
+use crate::noise::{Colours, Mask, Noise, Series};
 use crate::physics::simulation::{Excitation, Plan, Plant, Point, SimulationError};
 use crate::physics::spec::VariableKind;
 
@@ -163,12 +163,12 @@ impl<'a> Problem<'a> {
         Ok(problem)
     }
 
-    /// The first samples of each recording.
-    pub fn first_parts(&self, samples: usize) -> Vec<PlantRecording> {
+    /// The first samples of each recording: as many as `count` makes of its length.
+    pub fn parts(&self, count: impl Fn(usize) -> usize) -> Vec<PlantRecording> {
         let cut = |columns: &[Vec<f64>]| {
             columns
                 .iter()
-                .map(|c| c[..c.len().min(samples)].to_vec())
+                .map(|c| c[..count(c.len()).clamp(1.min(c.len()), c.len())].to_vec())
                 .collect()
         };
         let part = |r: &PlantRecording| PlantRecording {
@@ -306,12 +306,28 @@ impl<'a> Problem<'a> {
             .collect()
     }
 
-    /// Noise models that are tried in free run.
-    pub fn colours(&self) -> Colours {
+    /// The values of the text with one parameter at 0, for each that may be 0, and the place of that parameter: a plant with
+    /// a term less has fewer summits, and is never better than the whole one.
+    pub fn without_terms(&self) -> Vec<(Vec<f64>, Option<usize>)> {
+        let (nominal, ranges) = (self.nominal(), self.ranges());
+        let may_vanish =
+            |&i: &usize| nominal[i] != 0.0 && ranges[i].min <= 0.0 && 0.0 <= ranges[i].max;
+        let terms = (0..self.free.len()).filter(may_vanish);
+        terms
+            .map(|i| {
+                let mut point = nominal.clone();
+                point[i] = 0.0;
+                (point, Some(i))
+            })
+            .collect()
+    }
+
+    /// Noise model of what a free run leaves: white and Gaussian for least squares, else estimated.
+    pub fn noise(&self, residual: &Series) -> Noise {
         if self.options.least_squares {
-            Colours::White
+            Noise::white(residual, self.outputs(), &self.mask)
         } else {
-            Colours::All
+            Noise::estimate(residual, self.outputs(), &self.mask, Colours::All)
         }
     }
 

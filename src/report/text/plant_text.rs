@@ -5,6 +5,7 @@ use super::table::Table;
 use super::{Style, wrapped};
 use crate::physics::{ModelSpec, Plant, Unknown, VariableKind};
 use crate::report::PlantDocument;
+use crate::report::plant_document::FitDocument;
 
 /// Longest equation that is shown whole.
 const LONGEST: usize = 66;
@@ -12,6 +13,8 @@ const LONGEST: usize = 66;
 const LEVEL: f64 = 0.01;
 /// A linear model that leaves less than this share of the plant's error holds what the equations do not.
 const FOLLOWS_BETTER: f64 = 0.8;
+/// In innovation form, an error of the free run above so many one-step errors is said.
+const FREE_RUN_APART: f64 = 2.0;
 
 /// The plant as read: states, inputs, outputs, parameters, sorted equations, and an equilibrium.
 pub fn plant_text(plant: &Plant) -> String {
@@ -205,6 +208,7 @@ pub fn plant_estimate_text(document: &PlantDocument, title: &str, style: Style) 
         "output",
         "estimated",
         "rms error",
+        "held out",
         "values of the text",
         "best linear model",
         "its order",
@@ -214,6 +218,7 @@ pub fn plant_estimate_text(document: &PlantDocument, title: &str, style: Style) 
             f.output.clone(),
             percent(f.free_run_percent),
             significant(f.rms_error, 4),
+            f.held_out_percent.map_or(String::new(), percent),
             f.text_percent.map_or(String::new(), percent),
             f.linear_model_percent.map_or(String::new(), percent),
             f.linear_model_order
@@ -241,51 +246,94 @@ pub fn plant_estimate_text(document: &PlantDocument, title: &str, style: Style) 
     out
 }
 
-/// The headline.
+/// The headline: the form, what the residuals and the free run say of the equations, and what is open.
 fn verdict(document: &PlantDocument, title: &str) -> String {
-    let failed: Vec<&str> = document
-        .residual_tests
-        .iter()
-        .filter(|t| t.p_value < LEVEL / document.residual_tests.len().max(1) as f64)
-        .map(|t| t.question.as_str())
-        .collect();
-    let in_free_run = document.form != "innovation";
-    let better = document.fit.iter().filter(|_| in_free_run).find(|f| {
-        f.linear_model_percent
-            .is_some_and(|l| (100.0 - l) < FOLLOWS_BETTER * (100.0 - f.free_run_percent))
-    });
-    let form = match document.form.as_str() {
-        "innovation" => {
-            "in innovation form (an observer with a constant gain: the noise enters the states, or the plant integrates)"
-        }
-        _ => "in free run",
+    let tests = &document.residual_tests;
+    let level = LEVEL / tests.len().max(1) as f64;
+    let fails = |question: &str| {
+        let mut asked = tests.iter().filter(|t| t.question == question);
+        asked.any(|t| t.p_value < level)
     };
-    let what = if let (Some(f), Some(linear)) =
-        (better, better.and_then(|f| f.linear_model_percent))
-    {
-        format!(
-            "a linear model of order {} follows `{}` better, {} instead of {}: the equations leave something out; see \
-             `innovant explain`",
+    let depends = fails("inputs") || fails("products");
+    let innovation = document.form == "innovation";
+    let form = if innovation {
+        "in innovation form (an observer corrects the states at each sample)"
+    } else {
+        "in free run"
+    };
+    let residuals = match (depends, fails("white")) {
+        (true, _) => "the residuals depend on the inputs or on the outputs that they cause",
+        (_, true) => "the residuals are not white: standard deviations may be too small",
+        _ if innovation => "the one-step residuals are white and do not depend on the inputs",
+        _ => "the residuals are white and do not depend on the inputs",
+    };
+    let mut out = vec![residuals.to_owned()];
+    // The observer hides in one-step residuals what the free run shows.
+    let followed = innovation.then(|| worst_followed(document)).flatten();
+    if let Some(f) = followed {
+        out.push(format!(
+            "but the free run follows `{}` by {} only (rms error {}{})",
+            f.output,
+            percent(f.free_run_percent),
+            significant(f.rms_error, 3),
+            times(f, document),
+        ));
+    }
+    let better = better_linear_model(document);
+    if let Some((f, linear)) = better {
+        out.push(format!(
+            "a linear model of order {} follows `{}` better in free run, {} instead of {}",
             f.linear_model_order.unwrap_or(0),
             f.output,
             percent(linear),
             percent(f.free_run_percent)
-        )
-    } else if failed.contains(&"inputs") || failed.contains(&"products") {
-        "the residuals depend on the inputs or on the outputs that they cause: the equations leave something out; see \
-         `innovant explain`"
-            .to_owned()
-    } else if failed.contains(&"white") {
-        "the residuals are not white: standard deviations may be too small".to_owned()
-    } else {
-        "the residuals are white and do not depend on the inputs".to_owned()
-    };
+        ));
+    }
+    if depends || better.is_some() {
+        out.push("the equations leave something out; see `innovant explain`".to_owned());
+    } else if followed.is_some() {
+        out.push(
+            "either disturbances enter the states, or the equations leave something out; see `innovant explain`"
+                .to_owned(),
+        );
+    }
+    if !document.undetermined.is_empty() {
+        out.push("not every parameter is determined".to_owned());
+    }
     let count = document.parameters.len();
     let s = if count == 1 { "" } else { "s" };
-    let open = if document.undetermined.is_empty() {
-        ""
-    } else {
-        "; not every parameter is determined"
+    format!(
+        "{title}: {count} parameter{s} estimated {form}; {}",
+        out.join("; ")
+    )
+}
+
+/// How many times the free run's error is larger than the one-step error.
+fn times(f: &FitDocument, document: &PlantDocument) -> String {
+    let noise = document.noise.iter().find(|n| n.output == f.output);
+    noise.map_or(String::new(), |n| {
+        let ratio = significant(f.rms_error / n.innovation_std, 2);
+        format!(", {ratio} times the one-step error")
+    })
+}
+
+/// The output that the free run follows worst, where its error is well above the one-step residual.
+fn worst_followed(document: &PlantDocument) -> Option<&FitDocument> {
+    let ratio = |f: &FitDocument| {
+        let noise = document.noise.iter().find(|n| n.output == f.output);
+        noise.map_or(0.0, |n| f.rms_error / n.innovation_std)
     };
-    format!("{title}: {count} parameter{s} estimated {form}; {what}{open}")
+    let apart = document.fit.iter().filter(|f| ratio(f) > FREE_RUN_APART);
+    apart.max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
+}
+
+/// An output that the best linear model follows clearly better, with its fit.
+fn better_linear_model(document: &PlantDocument) -> Option<(&FitDocument, f64)> {
+    let each = document
+        .fit
+        .iter()
+        .filter_map(|f| Some((f, f.linear_model_percent?)));
+    let mut better =
+        each.filter(|(f, linear)| (100.0 - linear) < FOLLOWS_BETTER * (100.0 - f.free_run_percent));
+    better.next()
 }
