@@ -115,7 +115,7 @@ impl Unit {
         self.same(&Self::ONE)
     }
 
-    /// A derived unit, whether it is a factor (1) or divides (-1), and the base units that are left, where these are shorter
+    /// A derived unit that takes up the mass, whether it is a factor (1) or divides (-1), and the base units that are left, where these are shorter
     /// than base units alone.
     fn shortest(&self) -> (Option<(&'static str, f64)>, Self) {
         let length = |unit: &Self| unit.exponents.iter().map(|e| e.abs()).sum::<f64>();
@@ -124,8 +124,10 @@ impl Unit {
         for (name, exponents) in derived {
             let named = Self::from_exponents(exponents.map(f64::from));
             for (sign, rest) in [(1.0, self.per(&named)), (-1.0, self.times(&named))] {
-                let total = length(&rest) + 1.0;
-                if total < best.2 - TOLERANCE {
+                // Between equals, W/m reads better than N/s.
+                let total = length(&rest) + 1.0 + 0.1 * rest.exponents[2].abs();
+                // What is left of a mass beside a derived unit reads worse than base units: N/kg is m/s2.
+                if total < best.2 - TOLERANCE && rest.exponents[1].abs() < TOLERANCE {
                     best = (Some((*name, sign)), rest, total);
                 }
             }

@@ -2,7 +2,7 @@
 
 use super::{Unit, symbols};
 use crate::physics::error::shortened;
-use crate::physics::expression::{Binary, ExpressionId, Node};
+use crate::physics::expression::{Binary, ExpressionId, Function, Node};
 use crate::physics::spec::ModelSpec;
 use crate::physics::syntax::constant;
 use std::collections::HashSet;
@@ -99,6 +99,10 @@ impl<'a> Words<'a> {
                 Node::Number(_) => {
                     answer.extend(self.constant_unit(id).map(|unit| (unit, exponent)));
                 }
+                Node::Call(Function::Abs, a) => waiting.push((a, exponent)),
+                Node::Call(Function::Sqrt, a) => waiting.push((a, 0.5 * exponent)),
+                // The value of any other function is a pure number.
+                Node::Call(..) => {}
                 Node::Time => answer.push(("s".into(), exponent)),
                 _ => return None,
             }
