@@ -103,10 +103,45 @@ fn split(text: &str) -> Vec<&str> {
     parts
 }
 
+/// Puts another number in the place of a number, or another word of the text in the place of a word.
+fn exchange_alike(parts: &mut [&str], dice: &mut Dice) {
+    const NUMBERS: [&str; 10] = [
+        "0", "1", "2", "3", "0.5", "1e-9", "1e9", "1e308", "1e-300", "10",
+    ];
+    let kind = |part: &str| {
+        part.chars()
+            .next()
+            .map(|c| (c.is_ascii_digit(), c.is_alphabetic()))
+    };
+    let at = dice.below(parts.len());
+    match kind(parts[at]) {
+        Some((true, _)) => parts[at] = NUMBERS[dice.below(NUMBERS.len())],
+        Some((_, true)) => {
+            let from = dice.below(parts.len());
+            if kind(parts[from]) == kind(parts[at]) {
+                parts[at] = parts[from];
+            }
+        }
+        _ => {
+            const SIGNS: [&str; 5] = ["+", "-", "*", "/", "^"];
+            if SIGNS.contains(&parts[at]) {
+                parts[at] = SIGNS[dice.below(SIGNS.len())];
+            }
+        }
+    }
+}
+
 /// A text with one to six changes.
 fn changed(text: &str, other: &str, dice: &mut Dice) -> String {
     let mut parts = split(text);
     let donor = split(other);
+    // Half of the texts keep their form, so that many are plants still and are simulated.
+    if dice.below(2) == 0 {
+        for _ in 0..=dice.below(3) {
+            exchange_alike(&mut parts, dice);
+        }
+        return parts.concat();
+    }
     for _ in 0..=dice.below(6) {
         if parts.is_empty() {
             break;
