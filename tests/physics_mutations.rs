@@ -250,3 +250,11 @@ fn no_mutation_of_a_plant_makes_it_panic_or_wait() {
     println!("{count} texts, of which {plants} are plants; the slowest took {slowest:?}");
     assert!(plants > count / 50, "{plants} of {count} are plants");
 }
+
+#[test]
+fn slopes_that_are_no_numbers_give_no_equilibrium() {
+    for right in ["sqrt(-2 - x)", "1e308*x*1e10", "1/(x*0)", "x^(-300)*1e300"] {
+        let text = format!("model A output Real x(start=0.25); equation der(x) = {right}; end A;");
+        assert!(examine(&text), "{text}");
+    }
+}

@@ -128,44 +128,47 @@ fn cells(v: &Variable) -> [String; 5] {
 
 /// Whether the units agree, and what was not compared.
 fn agreement(spec: &ModelSpec) -> String {
+    const LISTED: usize = 8;
     let conflicts = unit_conflicts(spec).len();
     let mut said = match conflicts {
+        _ if spec.variables.iter().all(|v| v.unit.is_none()) => "Units were not checked".to_owned(),
         0 => "Units agree".to_owned(),
         1 => "1 unit conflict".to_owned(),
         n => format!("{n} unit conflicts"),
     };
-    let mut part = |names: Vec<&str>, what: &str| {
-        const LISTED: usize = 8;
-        if names.is_empty() {
-            return;
-        }
+    let without = spec.variables.iter().filter(|v| v.unit_text.is_none());
+    let unknown = spec
+        .variables
+        .iter()
+        .filter(|v| v.unit_text.is_some() && v.unit.is_none());
+    for (names, what) in [
+        (
+            without.map(|v| v.name.as_str()).collect::<Vec<_>>(),
+            "no unit",
+        ),
+        (
+            unknown.map(|v| v.name.as_str()).collect(),
+            "a unit that is not known",
+        ),
+    ] {
+        let (s, verb) = match names.len() {
+            0 => continue,
+            1 => ("", "has"),
+            _ => ("s", "have"),
+        };
         let shown = names
             .iter()
             .take(LISTED)
             .copied()
             .collect::<Vec<_>>()
             .join(", ");
-        let more = if names.len() > LISTED {
-            format!(" and {} more", names.len() - LISTED)
-        } else {
-            String::new()
-        };
-        said += &format!("; not compared, because {what}: {shown}{more}");
-    };
-    let of = |wanted: &dyn Fn(&Variable) -> bool| -> Vec<&str> {
-        let variables = spec.variables.iter().filter(|v| wanted(v));
-        variables.map(|v| v.name.as_str()).collect()
-    };
-    let all = spec.variables.len();
-    let without = of(&|v| v.unit_text.is_none());
-    if without.len() == all {
-        return "\nUnits were not compared: no variable has one.\n".to_owned();
+        let more = if names.len() > LISTED { ", ..." } else { "" };
+        said += &format!(
+            "; {} variable{s} {verb} {what} and fit{} everything: {shown}{more}",
+            names.len(),
+            if names.len() == 1 { "s" } else { "" }
+        );
     }
-    part(without, "no unit is declared");
-    part(
-        of(&|v| v.unit_text.is_some() && v.unit.is_none()),
-        "their unit is not known",
-    );
     format!("\n{}", wrapped("", &said))
 }
 
