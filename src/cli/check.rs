@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Outcome;
 use super::output::print;
-use super::plant::load;
+use super::plant::{load, tell_warnings};
+use super::{Outcome, Verbosity};
 use crate::report::text::plant_text;
 
 const EXAMPLE: &str = "Example:
@@ -24,8 +24,9 @@ pub(super) struct Flags {
     plant: PathBuf,
 }
 
-pub(super) fn run(flags: &Flags) -> anyhow::Result<Outcome> {
+pub(super) fn run(flags: &Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     let loaded = load(&flags.plant)?;
+    tell_warnings(&loaded, say);
     print(&plant_text(&loaded.plant))?;
     Ok(Outcome::Done)
 }

@@ -130,6 +130,13 @@ fn simulation(
     say: Verbosity,
 ) -> anyhow::Result<(Vec<Log>, Simulation)> {
     let files = &flags.simulation;
+    if let Some(plant) = files.iter().find(|f| super::plant::is_plant_file(f)) {
+        anyhow::bail!(
+            "{}: `explain` does not read plants in equations yet; give a linear model (JSON), or the outputs that `innovant \
+             simulate` computes with this plant (CSV)",
+            plant.display()
+        );
+    }
     let is_json = |path: &Path| {
         path.extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("json"))

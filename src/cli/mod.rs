@@ -135,7 +135,7 @@ fn dispatch(cli: Cli) -> anyhow::Result<Outcome> {
         Some(Command::Explain(flags)) => explain::run(flags, say),
         Some(Command::Validate(flags)) => validate::run(flags, say),
         Some(Command::Simulate(flags)) => simulate::run(flags, say),
-        Some(Command::Check(flags)) => check::run(&flags),
+        Some(Command::Check(flags)) => check::run(&flags, say),
         Some(Command::Show(flags)) => show::run(flags),
         Some(Command::Reproduce(flags)) => reproduce::run(flags, say),
         Some(Command::Schema(flags)) => schema::run(&flags),

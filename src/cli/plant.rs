@@ -5,11 +5,12 @@ use std::path::Path;
 use anyhow::Context;
 
 use super::Verbosity;
+use super::output::note;
 use super::roles::{RoleFlags, tell_reading};
 use crate::identify::{IdentifiedChannel, Recording};
-use crate::log::{Channel, Log, Reading, RoleNeed, Roles, Source};
+use crate::log::{Channel, Log, LogError, Reading, RoleNeed, Roles, Source};
 use crate::physics::estimate::PlantRecording;
-use crate::physics::{Hold, Plant, Point, check_units, parse};
+use crate::physics::{Hold, Plant, Point, SpecError, VariableId, diagnose, unknown_units};
 use crate::report::{PlantDocument, is_plant};
 
 /// A plant from a file.
@@ -20,6 +21,8 @@ pub(super) struct LoadedPlant {
     pub hold: Hold,
     /// What was estimated, where the file says so.
     pub document: Option<PlantDocument>,
+    /// What may be wrong with the text.
+    pub warnings: Vec<String>,
 }
 
 /// Whether a file holds a plant: a text by its name, or a document by what it says.
@@ -35,7 +38,12 @@ fn is_text(path: &Path) -> bool {
 /// Reads a plant.
 pub(super) fn load(path: &Path) -> anyhow::Result<LoadedPlant> {
     let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
+    let text = std::fs::read_to_string(path).map_err(|e| match e.kind() {
+        std::io::ErrorKind::InvalidData => {
+            anyhow::anyhow!("{name}: this is no plant: the file is not text in UTF-8")
+        }
+        _ => anyhow::anyhow!("{name}: cannot be read: {e}"),
+    })?;
     if !is_text(path) && text.trim_start().starts_with('{') {
         let document = PlantDocument::parse(&name, &text)?;
         let (plant, point) = document
@@ -47,10 +55,15 @@ pub(super) fn load(path: &Path) -> anyhow::Result<LoadedPlant> {
             point,
             hold: document.hold(),
             document: Some(document),
+            warnings: vec![],
         });
     }
-    let spec = parse(&text).map_err(|e| anyhow::anyhow!("{}", e.render(&name, &text)))?;
-    check_units(&spec).map_err(|e| anyhow::anyhow!("{}", e.render(&name, &text)))?;
+    let spec =
+        diagnose(&text).map_err(|errors| anyhow::anyhow!("{}", rendered(&errors, &name, &text)))?;
+    let unknown = unknown_units(&spec).into_iter();
+    let warnings = unknown
+        .map(|u| format!("{name}:{}:{}: {u}", u.line, u.column))
+        .collect();
     let plant = Plant::new(spec);
     let point = plant.nominal();
     Ok(LoadedPlant {
@@ -58,7 +71,24 @@ pub(super) fn load(path: &Path) -> anyhow::Result<LoadedPlant> {
         point,
         hold: Hold::Zero,
         document: None,
+        warnings,
     })
+}
+
+/// Errors one below the other, and how many they are.
+fn rendered(errors: &[SpecError], name: &str, text: &str) -> String {
+    let mut lines: Vec<String> = errors.iter().map(|e| e.render(name, text)).collect();
+    if errors.len() > 1 {
+        lines.push(format!("{} errors", errors.len()));
+    }
+    lines.join("\n")
+}
+
+/// Says on standard error what may be wrong with a plant that can be used.
+pub(super) fn tell_warnings(loaded: &LoadedPlant, say: Verbosity) {
+    for warning in loaded.warnings.iter().filter(|_| !say.quiet) {
+        note(&format!("warning: {warning}\n"));
+    }
 }
 
 /// Channels of the plant's inputs and outputs.
@@ -92,7 +122,7 @@ pub(super) fn read_recordings(
     };
     let (mut logs, mut recordings) = (Vec::new(), Vec::new());
     for source in sources {
-        let reading = Reading::read(source, &roles, need)?;
+        let reading = Reading::read(source, &roles, need).map_err(|e| other_names(e, plant))?;
         tell_reading(&source.to_string(), reading.said.as_deref(), say);
         for log in &reading.logs {
             recordings.push(Recording {
@@ -107,6 +137,33 @@ pub(super) fn read_recordings(
         logs.extend(reading.logs);
     }
     Ok((logs, recordings))
+}
+
+/// An error of reading, with the way to read a recording that has other names than the plant.
+fn other_names(error: LogError, plant: &Plant) -> anyhow::Error {
+    if !matches!(error, LogError::UnknownColumn { .. }) {
+        return error.into();
+    }
+    let spec = &plant.spec;
+    let flag = |flag: &str, variables: Vec<VariableId>| {
+        let names: Vec<&str> = variables
+            .iter()
+            .map(|&v| spec.variable(v).column())
+            .collect();
+        match names.as_slice() {
+            [] => None,
+            names => Some(format!("`{flag}` for {}", names.join(", "))),
+        }
+    };
+    let flags = [
+        flag("--inputs", spec.inputs()),
+        flag("--outputs", spec.outputs()),
+    ];
+    let flags: Vec<String> = flags.into_iter().flatten().collect();
+    anyhow::anyhow!(
+        "{error}; where the file has other names than the plant, list its columns with {}, in this order",
+        flags.join(" and with ")
+    )
 }
 
 /// A log as a recording of the plant.

@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
+use super::output::note;
 use super::plant::{
-    LoadedPlant, assignments, channels, load, read_recordings, recording, set_parameters, set_start,
+    LoadedPlant, assignments, channels, load, read_recordings, recording, set_parameters,
+    set_start, tell_warnings,
 };
 use super::roles::RoleFlags;
 use super::{Outcome, Verbosity};
@@ -37,15 +39,19 @@ pub(super) struct PlantRun<'a> {
 }
 
 pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
+    let loaded = load(asked.plant)?;
+    tell_warnings(&loaded, say);
     let LoadedPlant {
         plant,
         mut point,
         hold,
         document,
-    } = load(asked.plant)?;
+        ..
+    } = loaded;
     let hold = asked.hold.unwrap_or(hold);
     if let Some(text) = asked.parameters {
         parameters(&plant, &mut point, text)?;
+        tell_out_of_bounds(&plant, &point, say);
     }
     let estimated = matches!(asked.start, Start::Estimate);
     let need = if estimated {
@@ -128,6 +134,20 @@ pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         .collect();
     write_table(asked.output, log.sample_time, log.start_time, &columns)?;
     Ok(Outcome::Done)
+}
+
+/// Says on standard error which values are outside the bounds of the text: a simulation may use them.
+fn tell_out_of_bounds(plant: &crate::physics::Plant, point: &Point, say: Verbosity) {
+    for (&v, value) in plant.spec.parameters().iter().zip(&point.parameters) {
+        let v = plant.spec.variable(v);
+        if !(v.min..=v.max).contains(value) && !say.quiet {
+            let name = v.column();
+            note(&format!(
+                "warning: --parameters: {name} = {value} is outside its bounds in the text, {} to {}; it is used all the same\n",
+                v.min, v.max
+            ));
+        }
+    }
 }
 
 /// Values by name, or those of a plant that was estimated.

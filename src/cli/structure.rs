@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::output::{Output, check_distinct, paths, print};
-use super::plant::{load, read_recordings, recording};
+use super::plant::{load, read_recordings, recording, tell_warnings};
 use super::roles::RoleFlags;
 use super::terminal::style;
 use super::{Outcome, Verbosity};
@@ -98,6 +98,7 @@ pub(super) fn run(
     read.push(structure);
     let output = output.map(|o| Output::check(o, &read)).transpose()?;
     let loaded = load(structure)?;
+    tell_warnings(&loaded, say);
     let plant = &loaded.plant;
     let hold = flags.hold.map_or(loaded.hold, Hold::from);
     let options = EstimateOptions {

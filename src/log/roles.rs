@@ -459,7 +459,11 @@ fn no_roles(header: &Header, time: Option<usize>, need: RoleNeed) -> LogError {
 /// The header nearest to `asked` by edit distance, if it is near enough to be a slip.
 fn closest<'a>(header: &'a Header, asked: &str) -> Option<&'a Channel> {
     let asked = Channel::parse(asked).name.to_lowercase();
-    let allowed = (asked.chars().count() / 3).max(1);
+    // One letter in the place of another says nothing where there is only one.
+    let allowed = match asked.chars().count() {
+        0 | 1 => 0,
+        length => (length / 3).max(1),
+    };
     let distances = header
         .channels
         .iter()

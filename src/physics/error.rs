@@ -3,7 +3,7 @@
 use super::expression::Span;
 use std::fmt::Write as _;
 
-/// First error found in a model text.
+/// An error in a model text.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("line {line}, column {column}: {kind}")]
 pub struct SpecError {
@@ -34,6 +34,9 @@ pub enum SpecErrorKind {
     /// The text is not well formed in another way.
     #[error("{0}")]
     Syntax(String),
+    /// An equation among the declarations.
+    #[error("an equation before the word `equation`: put that word in a line above it")]
+    EquationTooEarly,
     /// Modelica that is outside the flat subset.
     #[error("{construct} outside the flat subset of Modelica: {advice}")]
     Unsupported {
@@ -61,13 +64,33 @@ pub enum SpecErrorKind {
         nearest: Option<String>,
     },
     /// A name declared twice.
-    #[error("`{name}` is declared twice: first in line {first_line}")]
+    #[error("`{name}` is declared twice: first in line {first_line}, column {first_column}")]
     Duplicate {
         /// The name.
         name: String,
         /// Line of its first declaration.
         first_line: usize,
+        /// Column of its first declaration.
+        first_column: usize,
     },
+    /// A variable that two equations determine.
+    #[error(
+        "`{unknown}` is determined twice: here and by `{first}` in line {first_line}, column {first_column}; remove one of \
+         the two equations"
+    )]
+    DeterminedTwice {
+        /// The variable or derivative.
+        unknown: String,
+        /// The other equation.
+        first: String,
+        /// Its line.
+        first_line: usize,
+        /// Its column.
+        first_column: usize,
+    },
+    /// A variable, or the derivative of one, that no equation determines.
+    #[error("{0}")]
+    Undetermined(String),
     /// A word of the language as a name.
     #[error("`{0}` is a word of the language and cannot be a name")]
     Reserved(String),
@@ -124,6 +147,12 @@ pub enum SpecErrorKind {
     UnitConflict(String),
 }
 
+/// Errors in one text that are reported: more say nothing that helps.
+pub(crate) const MOST_ERRORS: usize = 8;
+
+/// Stands where a text was cut.
+const CUT: &str = "...";
+
 impl SpecError {
     pub(crate) fn new(text: &str, span: Span, kind: SpecErrorKind) -> Self {
         let (line, column) = position(text, span.start);
@@ -147,22 +176,29 @@ impl SpecError {
         let source = text.lines().nth(self.line.saturating_sub(1)).unwrap_or("");
         let before = self.column.saturating_sub(1);
         // A line of a generated text may be long: show the part around the error.
-        let skipped = before.saturating_sub(WIDTH / 2);
-        let shown: String = source
-            .chars()
-            .skip(skipped)
-            .take(WIDTH)
-            .map(|c| if c.is_control() && c != '\t' { ' ' } else { c })
-            .collect();
+        let long = source.chars().nth(WIDTH).is_some();
+        let skipped = if long {
+            before.saturating_sub(WIDTH / 2)
+        } else {
+            0
+        };
+        let part = source.chars().skip(skipped).take(WIDTH);
+        let part = part.map(|c| if c.is_control() && c != '\t' { ' ' } else { c });
+        let mut shown = String::from(if skipped > 0 { CUT } else { "" });
+        let before = before - skipped + shown.len();
+        shown.extend(part);
         let blank: String = shown
             .chars()
-            .take(before - skipped)
+            .take(before)
             .map(|c| if c == '\t' { '\t' } else { ' ' })
             .collect();
         let marked = text
             .get(self.span.start..self.span.end)
             .map_or(1, |part| part.lines().next().unwrap_or("").chars().count());
-        let room = shown.chars().count().saturating_sub(before - skipped);
+        let room = shown.chars().count().saturating_sub(before);
+        if source.chars().nth(skipped + WIDTH).is_some() {
+            shown.push_str(CUT);
+        }
         let number = self.line.to_string();
         let mut answer = format!(
             "{file}:{}:{}: {}\n",
@@ -183,7 +219,7 @@ impl SpecError {
 }
 
 /// Line and column, from 1, of a byte.
-fn position(text: &str, byte: usize) -> (usize, usize) {
+pub(crate) fn position(text: &str, byte: usize) -> (usize, usize) {
     let head = text.as_bytes().get(..byte).unwrap_or(text.as_bytes());
     let line = head.iter().filter(|&&b| b == b'\n').count() + 1;
     let start = head.iter().rposition(|&b| b == b'\n').map_or(0, |p| p + 1);
@@ -214,7 +250,7 @@ pub(crate) fn shortened(text: &str) -> String {
             continue;
         }
         if count >= LENGTH {
-            answer.push_str("...");
+            answer.push_str(CUT);
             break;
         }
         if std::mem::take(&mut space) {
@@ -323,6 +359,20 @@ mod tests {
         assert!(error.render("a", &long).ends_with(" ^"));
         assert!(error.render("a", &long).len() < 500);
         assert!(!error.render("a", "short").is_empty());
+    }
+
+    #[test]
+    fn an_excerpt_that_is_cut_says_so() {
+        let text = format!("{} wrong {}", "a + ".repeat(50), "+ b".repeat(50));
+        let start = text.find("wrong").unwrap_or(0);
+        let end = start + 5;
+        let kind = SpecErrorKind::Syntax("x".into());
+        let shown = SpecError::new(&text, Span { start, end }, kind).render("a", &text);
+        let lines: Vec<&str> = shown.lines().collect();
+        assert!(lines[1].starts_with(" 1 | ..."), "{shown}");
+        assert!(lines[1].ends_with("..."), "{shown}");
+        let (at, mark) = (lines[1].find("wrong"), lines[2].find("^^^^^"));
+        assert!(at.is_some() && at == mark, "{shown}");
     }
 
     #[test]

@@ -21,5 +21,5 @@ pub use simulation::{
     Trajectory,
 };
 pub use spec::{Equation, ModelSpec, Unknown, Variable, VariableKind};
-pub use syntax::parse;
-pub use units::{Unit, check_units};
+pub use syntax::{diagnose, parse};
+pub use units::{Unit, UnknownUnit, check_units, unit_conflicts, unknown_units};

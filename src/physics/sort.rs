@@ -14,7 +14,7 @@ use super::syntax::draft::{Draft, DraftEquation};
 use std::collections::VecDeque;
 
 /// From what a text says to a model whose equations are in order.
-pub(crate) fn determine(draft: Draft) -> Result<ModelSpec, SpecError> {
+pub(crate) fn determine(draft: Draft) -> Result<ModelSpec, Vec<SpecError>> {
     let kinds = classify::kinds(&draft)?;
     let constants = constants::settle(&draft, &kinds)?;
     let mut expressions = draft.expressions;
@@ -28,17 +28,18 @@ pub(crate) fn determine(draft: Draft) -> Result<ModelSpec, SpecError> {
         equations: &draft.equations,
         incidence: &incidence,
     };
-    if let Some(error) = failure::explain(&system, &order, &draft.declarations) {
-        return Err(error);
-    }
+    let mut errors = failure::explain(&system, &order, &expressions, &draft.declarations);
     let mut equations = Vec::with_capacity(order.taken.len());
-    for &(equation, variable) in &order.taken {
-        equations.push(linear::solve(
-            &system,
-            &mut expressions,
-            equation,
-            variable,
-        )?);
+    let mut unsolved = vec![];
+    for &(equation, variable) in order.taken.iter().filter(|_| errors.is_empty()) {
+        match linear::solve(&system, &mut expressions, equation, variable) {
+            Ok(solved) => equations.push(solved),
+            Err(error) => unsolved.push(error),
+        }
+    }
+    errors.extend(unsolved);
+    if !errors.is_empty() {
+        return Err(errors);
     }
     let variables = draft
         .declarations
@@ -57,6 +58,7 @@ pub(crate) fn determine(draft: Draft) -> Result<ModelSpec, SpecError> {
             start: declared.start.map(|s| s.root),
             fixed: declared.fixed,
             value: settled.value,
+            number: settled.number,
             span: declared.span,
         })
         .collect();

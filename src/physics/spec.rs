@@ -45,6 +45,8 @@ pub struct Variable {
     pub fixed: bool,
     /// Value of a constant or parameter: numbers and other parameters only.
     pub value: Option<ExpressionId>,
+    /// What that value is, where parameters have the values of the text.
+    pub number: Option<f64>,
     /// Where it is declared: the name.
     pub span: Span,
 }

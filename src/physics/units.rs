@@ -5,9 +5,12 @@ mod symbols;
 #[cfg(test)]
 mod tests;
 mod types;
+mod unknown;
+mod words;
 
-pub use check::check_units;
+pub use check::{check_units, unit_conflicts};
 pub(crate) use types::type_unit;
+pub use unknown::{UnknownUnit, unknown_units};
 
 use std::fmt;
 
@@ -112,6 +115,26 @@ impl Unit {
         self.same(&Self::ONE)
     }
 
+    /// A derived unit that takes up the mass, whether it is a factor (1) or divides (-1), and the base units that are left, where these are shorter
+    /// than base units alone.
+    fn shortest(&self) -> (Option<(&'static str, f64)>, Self) {
+        let length = |unit: &Self| unit.exponents.iter().map(|e| e.abs()).sum::<f64>();
+        let mut best = (None, *self, length(self));
+        let derived = NAMED.iter().filter(|n| !n.0.contains(['.', '/']));
+        for (name, exponents) in derived {
+            let named = Self::from_exponents(exponents.map(f64::from));
+            for (sign, rest) in [(1.0, self.per(&named)), (-1.0, self.times(&named))] {
+                // Between equals, W/m reads better than N/s.
+                let total = length(&rest) + 1.0 + 0.1 * rest.exponents[2].abs();
+                // What is left of a mass beside a derived unit reads worse than base units: N/kg is m/s2.
+                if total < best.2 - TOLERANCE && rest.exponents[1].abs() < TOLERANCE {
+                    best = (Some((*name, sign)), rest, total);
+                }
+            }
+        }
+        (best.0, best.1)
+    }
+
     fn with(&self, other: &Self, combine: impl Fn(f64, f64) -> f64) -> Self {
         let mut exponents = self.exponents;
         for (a, b) in exponents.iter_mut().zip(&other.exponents) {
@@ -132,12 +155,15 @@ impl fmt::Display for Unit {
         if let Some((name, _)) = named {
             return f.write_str(name);
         }
+        let (derived, rest) = self.shortest();
         let part = |sign: f64| -> Vec<String> {
-            let parts = BASES.iter().zip(&self.exponents);
-            parts
+            let derived = derived.filter(|d| d.1 == sign);
+            let derived = derived.map(|d| d.0.to_string());
+            let parts = BASES.iter().zip(&rest.exponents);
+            let bases = parts
                 .filter(|(_, e)| sign * **e > TOLERANCE)
-                .map(|(base, e)| power_text(base, sign * e))
-                .collect()
+                .map(|(base, e)| power_text(base, sign * e));
+            derived.into_iter().chain(bases).collect()
         };
         let (above, below) = (part(1.0), part(-1.0));
         f.write_str(if above.is_empty() { "1" } else { "" })?;

@@ -104,12 +104,20 @@ impl Plant {
     /// A state at which nothing moves with these inputs, found by Newton's method from `state`; none when there is none nearby.
     pub fn equilibrium(&self, point: &Point, state: &[f64], inputs: &[f64]) -> Option<Vec<f64>> {
         const STEPS: usize = 50;
+        // The decomposition needs squares of the elements, and has no answer where one is not a number.
+        const LARGEST: f64 = 1e150;
+        const ITERATIONS: usize = 1000;
         let mut x = state.to_vec();
         for _ in 0..STEPS {
             let linear = self.linearise(point, &x, inputs, 0.0);
             let size = x.iter().map(|x| x.abs()).fold(1.0, f64::max);
             let right = nalgebra::DVector::from_vec(linear.derivative.clone());
-            let step = linear.a.svd(true, true).solve(&right, 1e-12).ok()?;
+            let sound = |v: &f64| v.abs() < LARGEST;
+            if !linear.a.iter().all(sound) || !right.iter().all(sound) {
+                return None;
+            }
+            let parts = linear.a.try_svd(true, true, f64::EPSILON, ITERATIONS)?;
+            let step = parts.solve(&right, 1e-12).ok()?;
             if !step.iter().all(|s| s.is_finite()) {
                 return None;
             }

@@ -6,7 +6,8 @@ use crate::physics::spec::VariableKind;
 use crate::physics::syntax::draft::{Declaration, Draft, DraftExpression, Role};
 
 /// The kind of each variable; parameters that are computed from others are settled later.
-pub(super) fn kinds(draft: &Draft) -> Result<Vec<VariableKind>, SpecError> {
+pub(super) fn kinds(draft: &Draft) -> Result<Vec<VariableKind>, Vec<SpecError>> {
+    let mut errors = vec![];
     let mut kinds: Vec<VariableKind> = draft
         .declarations
         .iter()
@@ -41,18 +42,19 @@ pub(super) fn kinds(draft: &Draft) -> Result<Vec<VariableKind>, SpecError> {
             }
         };
         let span = draft.expressions.span(id);
-        return Err(SpecError::new(
-            draft.text,
-            span,
-            SpecErrorKind::Derivative(message),
-        ));
+        let kind = SpecErrorKind::Derivative(message);
+        errors.push(SpecError::new(draft.text, span, kind));
     }
-    only_certain(draft, &kinds)?;
-    Ok(kinds)
+    only_certain(draft, &kinds, &mut errors);
+    if errors.is_empty() {
+        Ok(kinds)
+    } else {
+        Err(errors)
+    }
 }
 
 /// Values, starts, bounds and delays use numbers, constants and parameters only.
-fn only_certain(draft: &Draft, kinds: &[VariableKind]) -> Result<(), SpecError> {
+fn only_certain(draft: &Draft, kinds: &[VariableKind], errors: &mut Vec<SpecError>) {
     for declared in &draft.declarations {
         for (what, expression) in parts(declared) {
             if let Some((id, found)) = expression.range().find_map(|i| uncertain(draft, kinds, i)) {
@@ -61,7 +63,7 @@ fn only_certain(draft: &Draft, kinds: &[VariableKind]) -> Result<(), SpecError> 
                     shortened(&declared.name)
                 );
                 let span = draft.expressions.span(id);
-                return Err(SpecError::new(
+                errors.push(SpecError::new(
                     draft.text,
                     span,
                     SpecErrorKind::Value(message),
@@ -83,14 +85,13 @@ fn only_certain(draft: &Draft, kinds: &[VariableKind]) -> Result<(), SpecError> 
                 "the time of a delay may use numbers, constants and parameters only: `{}` changes",
                 excerpt(draft.text, span)
             );
-            return Err(SpecError::new(
+            errors.push(SpecError::new(
                 draft.text,
                 span,
                 SpecErrorKind::Value(message),
             ));
         }
     }
-    Ok(())
 }
 
 /// What a declaration states by an expression.

@@ -15,6 +15,7 @@ pub(super) struct Settled {
     pub(super) max: f64,
     pub(super) nominal: Option<f64>,
     pub(super) value: Option<ExpressionId>,
+    pub(super) number: Option<f64>,
 }
 
 /// What is settled about all variables.
@@ -25,15 +26,25 @@ pub(super) struct Constants {
 }
 
 /// Orders and evaluates constants and parameters, and evaluates bounds.
-pub(super) fn settle(draft: &Draft, kinds: &[VariableKind]) -> Result<Constants, SpecError> {
+///
+/// # Errors
+/// All values that are missing; where none is, all that are wrong in themselves.
+pub(super) fn settle(draft: &Draft, kinds: &[VariableKind]) -> Result<Constants, Vec<SpecError>> {
     let count = kinds.len();
     let mut values = vec![None; count];
+    let mut errors = vec![];
     for (index, declared) in draft.declarations.iter().enumerate() {
         if certain(kinds[index]) {
-            values[index] = Some(value_of(draft, declared)?);
+            match value_of(draft, declared) {
+                Ok(value) => values[index] = Some(value),
+                Err(error) => errors.push(error),
+            }
         }
     }
-    let order = order(draft, &values)?;
+    if !errors.is_empty() {
+        return Err(errors);
+    }
+    let order = order(draft, &values).map_err(|e| vec![e])?;
     let mut evaluator = Evaluator {
         draft,
         numbers: vec![0.0; count],
@@ -51,44 +62,67 @@ pub(super) fn settle(draft: &Draft, kinds: &[VariableKind]) -> Result<Constants,
             kinds[index] = VariableKind::Constant;
         }
         free[index] = computed || kinds[index] == VariableKind::Parameter;
-        evaluator.numbers[index] = evaluator.finite(declared, "value", value)?;
+        // What is computed from a wrong value is not looked at.
+        evaluator.numbers[index] = evaluator
+            .finite(declared, "value", value)
+            .map_err(|e| vec![e])?;
     }
     let mut settled = Vec::with_capacity(count);
     for (index, declared) in draft.declarations.iter().enumerate() {
-        let (min, max) = bounds(&mut evaluator, declared)?;
-        let nominal = match declared.nominal {
-            Some(n) => Some(evaluator.finite(declared, "nominal", n)?.abs()).filter(|&n| n > 0.0),
-            None => None,
-        };
-        let checked = if certain(kinds[index]) {
-            Some(("value", evaluator.numbers[index]))
-        } else if let Some(start) = declared.start {
-            Some(("start", evaluator.finite(declared, "start", start)?))
-        } else {
-            None
-        };
-        if let Some((what, number)) = checked
-            && !(min..=max).contains(&number)
-        {
-            let name = shortened(&declared.name);
-            return Err(value_error(
-                draft,
-                declared,
-                format!(
-                    "the {what} {number} of `{name}` is outside its bounds: min = {min}, max = {max}"
-                ),
-            ));
+        let kind = kinds[index];
+        match settled_one(&mut evaluator, declared, kind, index) {
+            Ok(one) => settled.push(Settled {
+                value: values[index].map(|v| v.root),
+                number: values[index].map(|_| evaluator.numbers[index]),
+                ..one
+            }),
+            Err(error) => errors.push(error),
         }
-        settled.push(Settled {
-            kind: kinds[index],
-            min,
-            max,
-            nominal,
-            value: values[index].map(|v| v.root),
-        });
     }
-    delays(&mut evaluator)?;
-    Ok(Constants { order, settled })
+    errors.extend(delays(&mut evaluator).err());
+    if errors.is_empty() {
+        Ok(Constants { order, settled })
+    } else {
+        Err(errors)
+    }
+}
+
+/// Bounds and nominal value, where the value or start is within them.
+fn settled_one(
+    evaluator: &mut Evaluator,
+    declared: &Declaration,
+    kind: VariableKind,
+    index: usize,
+) -> Result<Settled, SpecError> {
+    let (min, max) = bounds(evaluator, declared)?;
+    let nominal = match declared.nominal {
+        Some(n) => Some(evaluator.finite(declared, "nominal", n)?.abs()).filter(|&n| n > 0.0),
+        None => None,
+    };
+    let checked = if certain(kind) {
+        Some(("value", evaluator.numbers[index]))
+    } else if let Some(start) = declared.start {
+        Some(("start", evaluator.finite(declared, "start", start)?))
+    } else {
+        None
+    };
+    if let Some((what, number)) = checked
+        && !(min..=max).contains(&number)
+    {
+        let name = shortened(&declared.name);
+        let message = format!(
+            "the {what} {number} of `{name}` is outside its bounds: min = {min}, max = {max}"
+        );
+        return Err(value_error(evaluator.draft, declared, message));
+    }
+    Ok(Settled {
+        kind,
+        min,
+        max,
+        nominal,
+        value: None,
+        number: None,
+    })
 }
 
 fn certain(kind: VariableKind) -> bool {

@@ -1,7 +1,10 @@
 //! Says why the equations of a model do not determine its unknowns one after the other.
 
-use super::{Order, System};
-use crate::physics::error::{SpecError, SpecErrorKind, joined, listed, plural};
+use super::{Order, System, unknown_of};
+use crate::physics::error::{
+    MOST_ERRORS, SpecError, SpecErrorKind, excerpt, joined, listed, plural, position, shortened,
+};
+use crate::physics::expression::{ExpressionId, Expressions, Node};
 use crate::physics::spec::VariableKind;
 use crate::physics::syntax::draft::Declaration;
 use std::collections::VecDeque;
@@ -11,12 +14,13 @@ const NONE: u32 = u32::MAX;
 /// How many names or lines a message lists.
 const LISTED: usize = 8;
 
-/// The error, unless every unknown is determined and every equation is needed.
+/// The errors: none where every unknown is determined and every equation is needed.
 pub(super) fn explain(
     system: &System,
     order: &Order,
+    expressions: &Expressions,
     declarations: &[Declaration],
-) -> Option<SpecError> {
+) -> Vec<SpecError> {
     let is_unknown = |v: &usize| {
         matches!(
             system.kinds[*v],
@@ -30,62 +34,160 @@ pub(super) fn explain(
         plural(equations),
         plural(unknowns)
     );
-    if let Some(surplus) = (0..equations).find(|&e| !order.used[e] && order.open[e] == 0) {
-        return Some(nothing_left(system, order, surplus, &counts));
-    }
+    let failure = Failure {
+        system,
+        order,
+        expressions,
+        declarations,
+        counts,
+    };
+    let surplus = (0..equations).filter(|&e| !order.used[e] && order.open[e] == 0);
     let missing = (0..system.kinds.len())
         .filter(is_unknown)
         .filter(|&v| system.incidence.of_variable.row(v).is_empty());
-    let missing: Vec<usize> = missing.collect();
-    if let Some(&first) = missing.first() {
-        let names: Vec<String> = missing
-            .iter()
-            .map(|&v| system.names[v].to_string())
-            .collect();
-        let verb = if names.len() == 1 { "is" } else { "are" };
-        let message = format!(
-            "{} {verb} in no equation: {counts}; give it an equation, or make it an input or a parameter",
-            listed(&names, LISTED)
-        );
-        let kind = SpecErrorKind::Count(message);
-        return Some(SpecError::new(system.text, declarations[first].span, kind));
+    let errors: Vec<SpecError> = surplus
+        .map(|e| failure.nothing_left(e))
+        .chain(missing.map(|v| failure.undetermined(v)))
+        .take(MOST_ERRORS)
+        .collect();
+    if !errors.is_empty() {
+        return errors;
     }
-    let rest = Rest::new(system, order)?;
-    Some(rest.explain(&counts))
+    Rest::new(&failure).map_or_else(Vec::new, Rest::explain)
 }
 
-/// The error for an equation whose unknowns are all determined by others.
-fn nothing_left(system: &System, order: &Order, equation: usize, counts: &str) -> SpecError {
-    let row = system.incidence.of_equation.row(equation);
-    let by = |v: u32| order.by[v as usize].map(|e| system.line(e as usize));
-    let here = system.line(equation);
-    let message = match row {
-        [] => "this equation determines nothing: it has only states, inputs, parameters and numbers; a relation between \
-               states has to be differentiated by hand"
-            .to_string(),
-        &[v] => format!(
-            "`{}` is determined twice: in line {} and in line {here} ({counts})",
-            system.unknown_name(v as usize),
-            by(v).unwrap_or(here)
-        ),
-        several => {
-            let parts: Vec<String> = several
-                .iter()
-                .take(LISTED)
-                .filter_map(|&v| Some(format!("`{}` by line {}", system.unknown_name(v as usize), by(v)?)))
-                .collect();
+/// What is known when the equations do not determine the unknowns one after the other.
+struct Failure<'a> {
+    system: &'a System<'a>,
+    order: &'a Order,
+    expressions: &'a Expressions,
+    declarations: &'a [Declaration],
+    /// "2 equations for 3 unknowns"
+    counts: String,
+}
+
+impl Failure<'_> {
+    fn error(&self, equation: usize, kind: SpecErrorKind) -> SpecError {
+        let span = self.system.equations[equation].span;
+        SpecError::new(self.system.text, span, kind)
+    }
+
+    /// The error for a variable that no equation determines, at its declaration.
+    fn undetermined(&self, variable: usize) -> SpecError {
+        let declared = &self.declarations[variable];
+        let name = shortened(&declared.name);
+        let message = if self.system.kinds[variable] == VariableKind::State {
+            format!("no equation determines `der({name})`: add one, such as `der({name}) = ...;`")
+        } else if declared.start.is_some() {
             format!(
-                "this equation has nothing left to determine: other equations determine {} ({counts})",
-                joined(&parts, LISTED)
+                "`{name}` has a start value but no equation for `der({name})`: add one, such as `der({name}) = ...;`"
             )
+        } else if declared.output {
+            format!("no equation determines the output `{name}`: add one, such as `{name} = ...;`")
+        } else {
+            format!(
+                "no equation determines `{name}`: add one, such as `{name} = ...;`, or declare `{name}` as an `input` or a \
+                 `parameter`"
+            )
+        };
+        let kind = SpecErrorKind::Undetermined(message);
+        SpecError::new(self.system.text, declared.span, kind)
+    }
+
+    /// The error for an equation whose unknowns are all determined by others.
+    fn nothing_left(&self, equation: usize) -> SpecError {
+        let (system, order) = (self.system, self.order);
+        let by = |v: u32| order.by[v as usize].map(|e| e as usize);
+        let counts = &self.counts;
+        let message = match system.incidence.of_equation.row(equation) {
+            [] => self.no_unknown(equation),
+            &[v] => {
+                let other = by(v).unwrap_or(equation);
+                let start = |e: usize| system.equations[e].span.start;
+                let (first, second) = if start(other) < start(equation) {
+                    (other, equation)
+                } else {
+                    (equation, other)
+                };
+                let (first_line, first_column) = position(system.text, start(first));
+                let kind = SpecErrorKind::DeterminedTwice {
+                    unknown: system.unknown_name(v as usize),
+                    first: excerpt(system.text, system.equations[first].span),
+                    first_line,
+                    first_column,
+                };
+                return self.error(second, kind);
+            }
+            several => {
+                let part = |&v: &u32| {
+                    let line = system.line(by(v)?);
+                    Some(format!(
+                        "`{}` by line {line}",
+                        system.unknown_name(v as usize)
+                    ))
+                };
+                let parts: Vec<String> = several.iter().take(LISTED).filter_map(part).collect();
+                format!(
+                    "this equation has nothing left to determine: other equations determine {} ({counts})",
+                    joined(&parts, LISTED)
+                )
+            }
+        };
+        self.error(equation, SpecErrorKind::Count(message))
+    }
+
+    /// What is said about an equation without an unknown.
+    fn no_unknown(&self, equation: usize) -> String {
+        let whole = self.system.equations[equation];
+        let state = |index: usize| match self.expressions.node(ExpressionId(index as u32)) {
+            Node::Variable(v) if self.system.kinds[v.index()] == VariableKind::State => {
+                Some(v.index())
+            }
+            _ => None,
+        };
+        let mut states: Vec<usize> = whole.range().filter_map(state).collect();
+        states.sort_unstable();
+        states.dedup();
+        if let Some(&v) = states
+            .iter()
+            .find(|&&v| self.declarations[v].span.start == whole.span.start)
+        {
+            let name = shortened(&self.declarations[v].name);
+            let right = excerpt(self.system.text, self.expressions.span(whole.right.root));
+            return format!(
+                "`{name}` is a state, because `der({name})` is used, and `= {right}` gives it a second equation: a start value \
+                 is written `{name}(start={right})`"
+            );
         }
-    };
-    let span = system.equations[equation].span;
-    SpecError::new(system.text, span, SpecErrorKind::Count(message))
+        if states.is_empty() {
+            return "this equation determines nothing: it has only inputs, parameters and numbers; a parameter that follows from \
+                    others is declared with its value, as in `parameter Real b = 2*a;`"
+                .into();
+        }
+        let names: Vec<String> = states
+            .iter()
+            .map(|&v| self.declarations[v].name.clone())
+            .collect();
+        let (verb, s) = if names.len() == 1 {
+            ("is", "a state")
+        } else {
+            ("are", "states")
+        };
+        let advice = if names.len() == 1 {
+            "remove it, or the equation for the derivative"
+        } else {
+            "a relation between states has to be differentiated by hand, and one of them computed from the others"
+        };
+        format!(
+            "this equation determines nothing: {} {verb} {s}, which other equations determine by their derivatives; {advice}",
+            listed(&names, LISTED)
+        )
+    }
 }
 
 /// Equations and unknowns that are left when no equation has a single unknown.
 struct Rest<'a> {
+    failure: &'a Failure<'a>,
     system: &'a System<'a>,
     order: &'a Order,
     equations: Vec<u32>,
@@ -96,7 +198,8 @@ struct Rest<'a> {
 }
 
 impl<'a> Rest<'a> {
-    fn new(system: &'a System<'a>, order: &'a Order) -> Option<Self> {
+    fn new(failure: &'a Failure<'a>) -> Option<Self> {
+        let (system, order) = (failure.system, failure.order);
         let equations: Vec<u32> = (0..system.equations.len() as u32)
             .filter(|&e| !order.used[e as usize])
             .collect();
@@ -106,6 +209,7 @@ impl<'a> Rest<'a> {
             return None;
         }
         Some(Self {
+            failure,
             system,
             order,
             variable_of: vec![NONE; system.equations.len()],
@@ -122,13 +226,11 @@ impl<'a> Rest<'a> {
             .filter(|&v| self.order.by[v as usize].is_none())
     }
 
-    fn explain(mut self, counts: &str) -> SpecError {
+    fn explain(mut self) -> Vec<SpecError> {
         self.pair();
-        if let Some(&lonely) = self
-            .equations
-            .iter()
-            .find(|&&e| self.variable_of[e as usize] == NONE)
-        {
+        let counts = &self.failure.counts;
+        let mut unpaired = self.equations.iter();
+        if let Some(&lonely) = unpaired.find(|&&e| self.variable_of[e as usize] == NONE) {
             let members = self.reached_from(lonely);
             let variables: Vec<u32> = members
                 .iter()
@@ -143,27 +245,14 @@ impl<'a> Rest<'a> {
                 plural(variables.len()),
                 listed(&self.names(&variables), LISTED),
             );
-            return self.error(lonely, SpecErrorKind::Count(message));
+            let error = self
+                .failure
+                .error(lonely as usize, SpecErrorKind::Count(message));
+            return vec![error];
         }
-        let open =
-            |v: &u32| self.order.by[*v as usize].is_none() && self.equation_of[*v as usize] == NONE;
-        let mut left = self
-            .equations
-            .iter()
-            .flat_map(|&e| self.unknowns(e).map(move |v| (e, v)));
-        if let Some((equation, _)) = left.find(|(_, v)| open(v)) {
-            let mut all: Vec<u32> = self
-                .equations
-                .iter()
-                .flat_map(|&e| self.unknowns(e))
-                .collect();
-            all.sort_unstable();
-            all.dedup();
-            let message = format!(
-                "too few equations: {counts}; the equations that are left do not determine {}",
-                listed(&self.names(&all), LISTED)
-            );
-            return self.error(equation, SpecErrorKind::Count(message));
+        let missing = self.missing();
+        if !missing.is_empty() {
+            return missing;
         }
         let members = self.smallest_loop();
         let variables: Vec<u32> = members
@@ -172,7 +261,88 @@ impl<'a> Rest<'a> {
             .collect();
         let first = members.iter().copied().min().unwrap_or(0);
         let (variables, lines) = (self.names(&variables), self.lines(&members));
-        self.error(first, SpecErrorKind::AlgebraicLoop { variables, lines })
+        let kind = SpecErrorKind::AlgebraicLoop { variables, lines };
+        vec![self.failure.error(first as usize, kind)]
+    }
+
+    /// The errors where there are fewer equations than unknowns.
+    fn missing(&self) -> Vec<SpecError> {
+        let mut seen = vec![false; self.system.kinds.len()];
+        let unpaired = (0..seen.len() as u32).filter(|&v| {
+            self.order.by[v as usize].is_none()
+                && self.equation_of[v as usize] == NONE
+                && !self.system.incidence.of_variable.row(v as usize).is_empty()
+        });
+        // Whatever an unpaired unknown can take the equation of may be the one that lacks an equation.
+        let mut candidates: Vec<u32> = unpaired.collect();
+        let lacking = candidates.len();
+        for &v in &candidates {
+            seen[v as usize] = true;
+        }
+        let mut at = 0;
+        while let Some(&v) = candidates.get(at) {
+            at += 1;
+            for &e in self.system.incidence.of_variable.row(v as usize) {
+                let other = self.variable_of[e as usize];
+                if other != NONE && !std::mem::replace(&mut seen[other as usize], true) {
+                    candidates.push(other);
+                }
+            }
+        }
+        candidates.sort_unstable();
+        let on_left = self.alone_on_the_left();
+        let without: Vec<u32> = candidates
+            .iter()
+            .copied()
+            .filter(|&v| !on_left[v as usize])
+            .collect();
+        let with_start: Vec<u32> = without
+            .iter()
+            .copied()
+            .filter(|&v| {
+                self.system.kinds[v as usize] == VariableKind::Algebraic
+                    && self.failure.declarations[v as usize].start.is_some()
+            })
+            .collect();
+        let found = [without, with_start]
+            .into_iter()
+            .find(|group| group.len() == lacking);
+        match found {
+            _ if lacking == 0 => vec![],
+            Some(group) => {
+                let errors = group.iter().map(|&v| self.failure.undetermined(v as usize));
+                errors.take(MOST_ERRORS).collect()
+            }
+            None => {
+                let counts = &self.failure.counts;
+                let (s, verb) = (plural(lacking), if lacking == 1 { "is" } else { "are" });
+                let message = format!(
+                    "{lacking} equation{s} {verb} missing ({counts}): the others do not determine {}",
+                    listed(&self.names(&candidates), LISTED)
+                );
+                let span = self.failure.declarations[candidates[0] as usize].span;
+                let kind = SpecErrorKind::Undetermined(message);
+                vec![SpecError::new(self.system.text, span, kind)]
+            }
+        }
+    }
+
+    /// For each variable, whether it is the only unknown on the left of an equation, which is how equations are written.
+    fn alone_on_the_left(&self) -> Vec<bool> {
+        let mut answer = vec![false; self.system.kinds.len()];
+        for equation in self.system.equations {
+            let unknown = |i: usize| {
+                let node = self.failure.expressions.node(ExpressionId(i as u32));
+                unknown_of(node, self.system.kinds)
+            };
+            let mut unknowns = equation.left.range().filter_map(unknown);
+            if let Some(first) = unknowns.next()
+                && unknowns.all(|v| v == first)
+            {
+                answer[first.index()] = true;
+            }
+        }
+        answer
     }
 
     fn names(&self, variables: &[u32]) -> Vec<String> {
@@ -198,11 +368,6 @@ impl<'a> Rest<'a> {
         lines.sort_unstable();
         lines.dedup();
         lines
-    }
-
-    fn error(&self, equation: u32, kind: SpecErrorKind) -> SpecError {
-        let span = self.system.equations[equation as usize].span;
-        SpecError::new(self.system.text, span, kind)
     }
 
     /// Pairs equations with unknowns, as many as possible, by the method of Hopcroft and Karp.

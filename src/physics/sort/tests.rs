@@ -214,11 +214,11 @@ fn wrong_equations_are_named() {
     for (equations, wanted) in [
         (
             "x = u;\ny = u;",
-            "line 3, column 12: `z` is in no equation: 2 equations for 3 unknowns; give it an equation, or make it an input or a parameter",
+            "line 3, column 12: no equation determines `z`: add one, such as `z = ...;`, or declare `z` as an `input` or a `parameter`",
         ),
         (
             "x = u;\ny = x;\nx = 2*u;\nz = y;",
-            "line 7, column 1: `x` is determined twice: in line 5 and in line 7 (4 equations for 3 unknowns)",
+            "line 7, column 1: `x` is determined twice: here and by `x = u` in line 5, column 1; remove one of the two equations",
         ),
         (
             "x = u;\ny = x;\nz = y;\nx + y + z = u;",
@@ -226,11 +226,11 @@ fn wrong_equations_are_named() {
         ),
         (
             "der(x) = u;\nx = 2*u;\ny = u; z = u;",
-            "line 6, column 1: this equation determines nothing: it has only states, inputs, parameters and numbers; a relation between states has to be differentiated by hand",
+            "line 6, column 1: this equation determines nothing: `x` is a state, which other equations determine by their derivatives; remove it, or the equation for the derivative",
         ),
         (
             "x = u;\ny = z;",
-            "line 6, column 1: too few equations: 2 equations for 3 unknowns; the equations that are left do not determine `y` and `z`",
+            "line 3, column 12: no equation determines `z`: add one, such as `z = ...;`, or declare `z` as an `input` or a `parameter`",
         ),
         (
             "x = u;\ny = z + x;\nz = 2*y;",
@@ -323,5 +323,128 @@ fn ten_thousand_equations_in_reverse_order_are_sorted_quickly() {
         start.elapsed() < Duration::from_secs(10),
         "{:?}",
         start.elapsed()
+    );
+}
+
+/// All messages on a text, without the excerpt.
+fn messages(text: &str) -> Vec<String> {
+    match crate::physics::diagnose(text) {
+        Ok(_) => vec![],
+        Err(errors) => errors.iter().map(ToString::to_string).collect(),
+    }
+}
+
+#[test]
+fn what_is_not_determined_is_said_with_what_to_add() {
+    for (declarations, equations, wanted) in [
+        (
+            "Real x(start=0), v(start=1);",
+            "der(x) = v;",
+            "line 2, column 18: `v` has a start value but no equation for `der(v)`: add one, such as `der(v) = ...;`",
+        ),
+        (
+            "Real x(start=0); Real v(start=1);",
+            "der(x) = u;",
+            "line 2, column 23: `v` has a start value but no equation for `der(v)`: add one, such as `der(v) = ...;`",
+        ),
+        (
+            "Real x; output Real y;",
+            "der(x) = -x + u;",
+            "line 2, column 21: no equation determines the output `y`: add one, such as `y = ...;`",
+        ),
+        (
+            "Real x; Real a;",
+            "a = der(x);",
+            "line 2, column 6: no equation determines `der(x)`: add one, such as `der(x) = ...;`",
+        ),
+        (
+            "Real x; Real y;",
+            "x + y = u;",
+            "line 2, column 6: 1 equation is missing (1 equation for 2 unknowns): the others do not determine `x` and `y`",
+        ),
+        (
+            "Real x; Real y = u;",
+            "der(x) = y; y = 2*u;",
+            "line 4, column 13: `y` is determined twice: here and by `y = u` in line 2, column 14; remove one of the two equations",
+        ),
+        (
+            "Real x;",
+            "x = u; x = 3;",
+            "line 4, column 8: `x` is determined twice: here and by `x = u` in line 4, column 1; remove one of the two equations",
+        ),
+        (
+            "Real x = 1;",
+            "der(x) = u;",
+            "line 2, column 6: `x` is a state, because `der(x)` is used, and `= 1` gives it a second equation: a start value is written `x(start=1)`",
+        ),
+        (
+            "Real x; parameter Real a = 1, b = 2;",
+            "der(x) = u; a = 2*b;",
+            "line 4, column 13: this equation determines nothing: it has only inputs, parameters and numbers; a parameter that follows from others is declared with its value, as in `parameter Real b = 2*a;`",
+        ),
+        (
+            "Real x; Real v;",
+            "der(x) = u; der(v) = u; x = 2*v;",
+            "line 4, column 25: this equation determines nothing: `x` and `v` are states, which other equations determine by their derivatives; a relation between states has to be differentiated by hand, and one of them computed from the others",
+        ),
+    ] {
+        let text = format!("model A input Real u;\n{declarations}\nequation\n{equations}\nend A;");
+        assert_eq!(messages(&text), [wanted], "{declarations} {equations}");
+    }
+}
+
+#[test]
+fn independent_errors_are_all_reported() {
+    for (text, wanted) in [
+        (
+            "model A\nReal x(strat=1);\nReal y;\nequation\nder(x) = -x;\ny := 3*x;\nend A;",
+            vec![
+                "line 2, column 8: `strat` is not an attribute; did you mean `start`?",
+                "line 6, column 3: `:=` stands in algorithms only: write `=`",
+            ],
+        ),
+        (
+            "model A\nReal x\nReal omega;\nequation\nder(x) = -omga;\nomega = 3*y;\nend A;",
+            vec![
+                "line 2, column 6: a `;` is missing at the end of this line",
+                "line 5, column 11: `omga` is not declared; did you mean `omega`?",
+                "line 6, column 11: `y` is not declared",
+            ],
+        ),
+        (
+            "model A\nparameter Real a;\nparameter Real b(min=2) = 1;\nparameter Real c;\nReal x;\nequation\nder(x) = a*b*c;\nend A;",
+            vec![
+                "line 2, column 16: the parameter `a` has no value: write `= value` behind its name",
+                "line 4, column 16: the parameter `c` has no value: write `= value` behind its name",
+            ],
+        ),
+        (
+            "model A\nReal x(unit=\"m\"), v(unit=\"m/s\"), y;\nequation\nder(x) = v + x;\nder(v) = -x + v;\ny = sin(x);\nend A;",
+            vec![
+                "line 4, column 10: unit conflict: `v + x`: m/s plus m",
+                "line 5, column 10: unit conflict: `-x + v`: m plus m/s",
+                "line 6, column 5: unit conflict: `sin(x)`: the argument is m, and has to be a pure number",
+            ],
+        ),
+        (
+            "model A\nReal x, y, z;\nequation\nx = 1;\nx = 2;\ny = 1;\nend A;",
+            vec![
+                "line 2, column 12: no equation determines `z`: add one, such as `z = ...;`, or declare `z` as an `input` or a `parameter`",
+                "line 5, column 1: `x` is determined twice: here and by `x = 1` in line 4, column 1; remove one of the two equations",
+            ],
+        ),
+        (
+            "model A\nReal x;\nder(x) = 3*q;\nder(x) = 2;\nend A;",
+            vec![
+                "line 3, column 1: an equation before the word `equation`: put that word in a line above it",
+            ],
+        ),
+    ] {
+        assert_eq!(messages(text), wanted, "{text}");
+    }
+    let many = "Real a b;\n".repeat(100);
+    assert_eq!(
+        messages(&format!("model A\n{many}equation\nend A;")).len(),
+        8
     );
 }

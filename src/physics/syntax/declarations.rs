@@ -4,7 +4,7 @@ use super::draft::{Declaration, DraftEquation, DraftExpression, Role};
 use super::names;
 use super::parser::{FLATTEN, Parser};
 use super::tokens::{Token, unescape};
-use crate::physics::error::{SpecError, SpecErrorKind, line_of, shortened};
+use crate::physics::error::{SpecError, SpecErrorKind, position, shortened};
 use crate::physics::expression::{Node, Span, VariableId};
 use crate::physics::units::{Unit, type_unit};
 use std::collections::HashMap;
@@ -128,9 +128,9 @@ pub(super) fn construct(parser: &Parser) -> SpecError {
         "when" => "there are no events: write a condition with `if`",
         "for" | "while" => "write the equations one by one",
         "if" => "write `y = if a then b else c;`",
-        "connect" | "extends" | "flow" | "stream" | "connector" | "inner" | "outer"
-        | "replaceable" | "redeclare" | "package" | "record" | "function" | "type"
-        | "expandable" | "external" | "pure" | "impure" | "operator" => FLATTEN,
+        "model" | "block" | "class" | "connect" | "extends" | "flow" | "stream" | "connector"
+        | "inner" | "outer" | "replaceable" | "redeclare" | "package" | "record" | "function"
+        | "type" | "expandable" | "external" | "pure" | "impure" | "operator" => FLATTEN,
         "algorithm" => "write equations `lhs = rhs;` behind the word `equation`",
         "initial" => "give start values in the declarations, as in `Real x(start=1, fixed=true);`",
         "Integer" | "Boolean" | "String" | "enumeration" => {
@@ -177,6 +177,7 @@ fn real_type(parser: &Parser, name: &str, span: Span) -> Result<Option<&'static 
         }
     } else {
         let advice = match name.rsplit('.').next() {
+            Some("double" | "float" | "Double" | "Float" | "number") => "declare it `Real`",
             Some("RealInput") => "declare it `input Real`",
             Some("RealOutput") => "declare it `output Real`",
             _ => FLATTEN,
@@ -196,6 +197,12 @@ fn component<'a>(
     type_unit: Option<&'static str>,
 ) -> Result<(), SpecError> {
     let (name, span) = (parser.word(), parser.span);
+    if matches!(parser.token, Token::Number(_)) {
+        return Err(parser.syntax(
+            span,
+            "a number behind `,`: a decimal number is written with a point, as in `0.5`",
+        ));
+    }
     if parser.token != Token::Name {
         return Err(parser.expected("the name of a variable"));
     }
@@ -203,14 +210,20 @@ fn component<'a>(
     if written.split('.').any(names::is_reserved) {
         return Err(parser.error(span, SpecErrorKind::Reserved(shortened(name))));
     }
-    let id = VariableId(declared.declarations.len() as u32);
-    if let Some(earlier) = declared.index.insert(written, id) {
+    let earlier = declared.index.get(written).copied();
+    if let Some(earlier) = earlier {
         let first = declared
             .declarations
             .get(earlier.index())
             .map_or(0, |d| d.span.start);
-        let (name, first_line) = (shortened(name), line_of(parser.text, first));
-        return Err(parser.error(span, SpecErrorKind::Duplicate { name, first_line }));
+        let (first_line, first_column) = position(parser.text, first);
+        let kind = SpecErrorKind::Duplicate {
+            name: shortened(name),
+            first_line,
+            first_column,
+        };
+        let error = parser.error(span, kind);
+        parser.errors.push(error);
     }
     parser.advance()?;
     let role = prefixes.role();
@@ -245,7 +258,12 @@ fn component<'a>(
         return Err(parser.unsupported(parser.span, "conditional declarations are", FLATTEN));
     }
     declaration.description = comment(parser)?;
-    declared.declarations.push(declaration);
+    if earlier.is_none() {
+        let id = VariableId(declared.declarations.len() as u32);
+        declared.index.insert(written, id);
+        parser.declared.insert(written);
+        declared.declarations.push(declaration);
+    }
     Ok(())
 }
 

@@ -4,7 +4,7 @@ use super::draft::DraftExpression;
 use super::names::{self, Callee};
 use super::parser::{ARRAYS, FLATTEN, Parser, Typed};
 use super::tokens::Token;
-use crate::physics::error::{SpecError, SpecErrorKind, excerpt, line_of};
+use crate::physics::error::{SpecError, SpecErrorKind, excerpt, line_of, shortened};
 use crate::physics::expression::{Binary, Node, Span};
 
 /// Parentheses, calls and if-expressions inside each other.
@@ -289,6 +289,9 @@ impl<'a> Parser<'a> {
                 Ok(inner)
             }
             Token::Sign("{" | "[") => Err(self.no_arrays()),
+            Token::Sign("*") if self.text[..span.start].ends_with('*') => {
+                Err(self.syntax(span, "a power is written with `^`, as in `x^2`"))
+            }
             Token::Sign(sign @ ("-" | "+")) => Err(self.syntax(
                 span,
                 format!("a sign behind an operator needs parentheses: write `({sign}a)`"),
@@ -332,6 +335,12 @@ impl<'a> Parser<'a> {
         if self.at_sign("(") {
             return self.call(name, span);
         }
+        if !self.declared.contains(name) && names::function(name, &self.imports).is_some() {
+            let message = format!(
+                "`{name}` is a function: its argument stands in parentheses, as in `{name}(x)`"
+            );
+            return Err(self.syntax(span, message));
+        }
         let variable = self
             .symbols
             .number(name.strip_prefix('.').unwrap_or(name), span);
@@ -350,6 +359,17 @@ impl<'a> Parser<'a> {
         if self.at_sign("[") {
             return Err(self.no_arrays());
         }
+        if one_name && (self.at_sign(",") || self.at_sign("(")) {
+            let name = shortened(name);
+            let message = if self.at_sign(",") {
+                format!(
+                    "`der` is the derivative with respect to time and takes one name: write `der({name})`"
+                )
+            } else {
+                format!("variables are written without `(t)`: write `der({name})`")
+            };
+            return Err(self.error(span, SpecErrorKind::Derivative(message)));
+        }
         if !one_name || !self.at_sign(")") {
             return Err(self.error(span, SpecErrorKind::Derivative(
                 "`der` takes the name of one variable: give the expression a name of its own, as in `v = der(x)`, and write \
@@ -367,7 +387,9 @@ impl<'a> Parser<'a> {
 
     fn call(&mut self, name: &'a str, span: Span) -> Result<Typed, SpecError> {
         let Some(callee) = names::function(name, &self.imports) else {
-            return Err(self.unknown_function(name, span));
+            return Err(self
+                .called_variable(name, span)
+                .unwrap_or_else(|| self.unknown_function(name, span)));
         };
         let opening = self.span;
         self.advance()?;
@@ -424,6 +446,23 @@ impl<'a> Parser<'a> {
             _ => return Err(self.expected("arguments")),
         };
         Ok(Typed::number(self.push(node, whole)?))
+    }
+
+    /// The error for the name of a variable before the `(` that stands here.
+    fn called_variable(&self, name: &str, span: Span) -> Option<SpecError> {
+        let behind = self.text.get(self.span.end..).unwrap_or("");
+        let argument = behind.split([')', ';']).next().unwrap_or("").trim();
+        let of_time = matches!(argument, "t" | "time");
+        let declared = self.declared.contains(name);
+        let name = shortened(name);
+        let message = if of_time && (declared || names::nearest_function(&name).is_none()) {
+            format!("variables are written without `({argument})`: write `{name}`")
+        } else if declared {
+            format!("`{name}` is a variable and no function: a product is written `{name}*(...)`")
+        } else {
+            return None;
+        };
+        Some(self.syntax(span, message))
     }
 
     fn unknown_function(&self, name: &str, span: Span) -> SpecError {

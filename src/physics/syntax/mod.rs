@@ -43,9 +43,9 @@ mod parser;
 mod tests;
 mod tokens;
 
-pub(crate) use names::constant;
+pub(crate) use names::{constant, nearest};
 
-use super::error::{SpecError, SpecErrorKind, shortened};
+use super::error::{MOST_ERRORS, SpecError, SpecErrorKind, shortened};
 use super::expression::{Binary, Node, Span};
 use super::spec::ModelSpec;
 use declarations::{Declared, annotation, comment, construct, declaration, description};
@@ -61,21 +61,84 @@ const MOST_PACKAGES: usize = 32;
 /// Reads a model, and settles which equation determines what and in which order.
 ///
 /// # Errors
-/// The first thing in the text that is wrong, contradictory or outside the subset.
+/// The first thing in the text that is wrong, contradictory or outside the subset. [`diagnose`] gives more than the first.
 pub fn parse(text: &str) -> Result<ModelSpec, SpecError> {
+    read(text).map_err(|mut errors| errors.swap_remove(0))
+}
+
+/// Reads a model and compares its units.
+///
+/// # Errors
+/// At most eight errors, in the order of the text, none of which follows from another.
+pub fn diagnose(text: &str) -> Result<ModelSpec, Vec<SpecError>> {
+    let spec = read(text)?;
+    let mut conflicts = super::units::unit_conflicts(&spec);
+    conflicts.truncate(MOST_ERRORS);
+    if conflicts.is_empty() {
+        Ok(spec)
+    } else {
+        Err(conflicts)
+    }
+}
+
+/// Errors are at least one, at most [`MOST_ERRORS`], and in the order of the text.
+fn read(text: &str) -> Result<ModelSpec, Vec<SpecError>> {
+    let found = match draft(text) {
+        Ok(draft) => super::sort::determine(draft),
+        Err(errors) => Err(errors),
+    };
+    found.map_err(|mut errors| {
+        errors.sort_by_key(|e| (e.line, e.column));
+        errors.truncate(MOST_ERRORS);
+        errors
+    })
+}
+
+fn draft(text: &str) -> Result<Draft<'_>, Vec<SpecError>> {
     if text.len() > LONGEST {
         let message = format!(
             "the text has {} bytes: more than {LONGEST} are not read",
             text.len()
         );
         let kind = SpecErrorKind::Limit(message);
-        return Err(SpecError::new(text, Span::default(), kind));
+        return Err(vec![SpecError::new(text, Span::default(), kind)]);
     }
-    super::sort::determine(draft(text)?)
+    let mut parser = Parser::new(text).map_err(|e| vec![e])?;
+    let mut declared = Declared::default();
+    let read = model(&mut parser, &mut declared);
+    let heading = match read {
+        Ok(heading) => heading,
+        Err(last) => {
+            parser.errors.push(last);
+            return Err(parser.errors);
+        }
+    };
+    let resolved = parser.symbols.resolve(
+        text,
+        &declared.index,
+        &parser.imports,
+        &parser.unread,
+        &mut parser.expressions,
+    );
+    parser.errors.extend(resolved);
+    if !parser.errors.is_empty() {
+        return Err(parser.errors);
+    }
+    Ok(Draft {
+        text,
+        name: heading.0.to_string(),
+        description: heading.1,
+        declarations: declared.declarations,
+        equations: declared.equations,
+        expressions: parser.expressions,
+    })
 }
 
-fn draft(text: &str) -> Result<Draft<'_>, SpecError> {
-    let mut parser = Parser::new(text)?;
+/// The whole text: name and description of the model, whose parts are put into `declared`.
+fn model<'a>(
+    parser: &mut Parser<'a>,
+    declared: &mut Declared<'a>,
+) -> Result<(&'a str, String), SpecError> {
     if parser.token == Token::End {
         return Err(parser.syntax(
             parser.span,
@@ -89,47 +152,34 @@ fn draft(text: &str) -> Result<Draft<'_>, SpecError> {
         parser.require_sign(";", "behind `within`")?;
     }
     while parser.at_word("import") {
-        import(&mut parser)?;
+        import(parser)?;
     }
     while parser.at_word("encapsulated") || parser.at_word("partial") {
         parser.advance()?;
     }
-    let (name, description) = heading(&mut parser)?;
-    let mut declared = Declared::default();
+    let (name, description) = heading(parser)?;
     while !parser.at_word("end") {
         if parser.take_word("equation")? {
-            equations(&mut parser, &mut declared)?;
-        } else if parser.at_word("import") {
-            import(&mut parser)?;
-        } else if parser.at_word("public") || parser.at_word("protected") {
-            parser.advance()?;
-        } else if annotation(&mut parser)? {
-            parser.require_sign(";", "behind the annotation")?;
-        } else {
-            element(&mut parser, &mut declared)?;
+            equations(parser, declared)?;
+            continue;
+        }
+        let start = parser.span.start;
+        if let Err(error) = element(parser, declared) {
+            let section_missing = *error.kind == SpecErrorKind::EquationTooEarly;
+            parser.recover(error, start)?;
+            if section_missing {
+                equations(parser, declared)?;
+            }
         }
     }
-    ending(&mut parser, name)?;
-    if declared.declarations.is_empty() {
+    ending(parser, name)?;
+    if declared.declarations.is_empty() && parser.errors.is_empty() {
         return Err(parser.syntax(
             Span::default(),
             format!("the model `{}` declares no variable", shortened(name)),
         ));
     }
-    parser.symbols.resolve(
-        text,
-        &declared.index,
-        &parser.imports,
-        &mut parser.expressions,
-    )?;
-    Ok(Draft {
-        text,
-        name: name.to_string(),
-        description,
-        declarations: declared.declarations,
-        equations: declared.equations,
-        expressions: parser.expressions,
-    })
+    Ok((name, description))
 }
 
 fn heading<'a>(parser: &mut Parser<'a>) -> Result<(&'a str, String), SpecError> {
@@ -160,6 +210,9 @@ fn heading<'a>(parser: &mut Parser<'a>) -> Result<(&'a str, String), SpecError> 
             "a model that is another one with changes is",
             FLATTEN,
         ));
+    }
+    if parser.token == Token::Name && parser.word().starts_with('\'') {
+        return Err(parser.syntax(parser.span, "a description stands in double quotes"));
     }
     Ok((name, description(parser)?))
 }
@@ -204,11 +257,17 @@ fn import(parser: &mut Parser) -> Result<(), SpecError> {
 }
 
 fn element<'a>(parser: &mut Parser<'a>, declared: &mut Declared<'a>) -> Result<(), SpecError> {
+    if parser.at_word("import") {
+        return import(parser);
+    }
+    if parser.at_word("public") || parser.at_word("protected") {
+        return parser.advance();
+    }
+    if annotation(parser)? {
+        return parser.require_sign(";", "behind the annotation");
+    }
     if parser.at_word("der") {
-        return Err(parser.syntax(
-            parser.span,
-            "an equation before the word `equation`: put that word in a line above it",
-        ));
+        return Err(parser.error(parser.span, SpecErrorKind::EquationTooEarly));
     }
     if parser.at_word("initial") {
         return Err(construct(parser));
@@ -221,32 +280,43 @@ fn element<'a>(parser: &mut Parser<'a>, declared: &mut Declared<'a>) -> Result<(
 
 fn equations(parser: &mut Parser, declared: &mut Declared) -> Result<(), SpecError> {
     loop {
-        if annotation(parser)? {
-            parser.require_sign(";", "behind the annotation")?;
-            continue;
+        if parser.token == Token::Name
+            && matches!(parser.word(), "end" | "equation" | "public" | "protected")
+        {
+            return Ok(());
         }
-        if parser.token == Token::Name {
-            match parser.word() {
-                "end" | "equation" | "public" | "protected" => return Ok(()),
-                "parameter" | "constant" | "input" | "output" | "final" | "Real" | "import" => {
-                    return Err(
-                        parser.syntax(parser.span, "declarations stand before the word `equation`")
-                    );
-                }
-                "when" | "for" | "if" | "while" | "connect" | "extends" | "algorithm"
-                | "initial" | "reinit" | "assert" | "terminate" | "Integer" | "Boolean"
-                | "String" | "flow" | "discrete" => {
-                    return Err(construct(parser));
-                }
-                _ => {}
-            }
+        let start = parser.span.start;
+        match equation_or_annotation(parser) {
+            Ok(equation) => declared.equations.extend(equation),
+            Err(error) => parser.recover(error, start)?,
         }
-        if parser.token == Token::End {
-            return Err(parser.expected("an equation or `end`"));
-        }
-        let equation = equation(parser)?;
-        declared.equations.push(equation);
     }
+}
+
+fn equation_or_annotation(parser: &mut Parser) -> Result<Option<DraftEquation>, SpecError> {
+    if annotation(parser)? {
+        parser.require_sign(";", "behind the annotation")?;
+        return Ok(None);
+    }
+    if parser.token == Token::Name {
+        match parser.word() {
+            "parameter" | "constant" | "input" | "output" | "final" | "Real" | "import" => {
+                return Err(
+                    parser.syntax(parser.span, "declarations stand before the word `equation`")
+                );
+            }
+            "when" | "for" | "if" | "while" | "connect" | "extends" | "algorithm" | "initial"
+            | "reinit" | "assert" | "terminate" | "Integer" | "Boolean" | "String" | "flow"
+            | "discrete" => {
+                return Err(construct(parser));
+            }
+            _ => {}
+        }
+    }
+    if parser.token == Token::End {
+        return Err(parser.expected("an equation or `end`"));
+    }
+    equation(parser).map(Some)
 }
 
 fn equation(parser: &mut Parser) -> Result<DraftEquation, SpecError> {

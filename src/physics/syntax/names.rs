@@ -1,10 +1,10 @@
 //! What names mean: words of the language, functions, constants, imports, and the variables of the model.
 
-use crate::physics::error::{SpecError, SpecErrorKind, excerpt, shortened};
+use crate::physics::error::{MOST_ERRORS, SpecError, SpecErrorKind, excerpt, shortened};
 use crate::physics::expression::{
     Binary, ExpressionId, Expressions, Function, Node, Span, VariableId,
 };
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Words that Modelica reserves.
 const RESERVED: [&str; 64] = [
@@ -206,26 +206,38 @@ impl<'a> Symbols<'a> {
         }))
     }
 
-    /// Puts variables, and the numbers of known constants, in the place of names.
+    /// Puts variables, and the numbers of known constants, in the place of names. Gives an error for each name without a
+    /// meaning, except those of parts that were not read.
     pub(super) fn resolve(
         &self,
         text: &str,
         declared: &HashMap<&'a str, VariableId>,
         imports: &Imports,
+        unread: &HashSet<&str>,
         expressions: &mut Expressions,
-    ) -> Result<(), SpecError> {
+    ) -> Vec<SpecError> {
+        let mut errors = vec![];
         let mut table = Vec::with_capacity(self.used.len());
         for &(name, span) in &self.used {
             let known = declared.get(name).map(|&v| Node::Variable(v)).or_else(|| {
                 let value = imports.meanings(name).find_map(|m| constant(&m))?.0;
                 Some(Node::Number(value))
             });
-            table.push(known.ok_or_else(|| {
+            if known.is_none() && !unread.contains(name) {
                 let candidates = declared.keys().copied().chain(["time"]);
                 let nearest = nearest(name, candidates).or_else(|| nearest_constant(name));
                 let name = shortened(name);
-                SpecError::new(text, span, SpecErrorKind::Undeclared { name, nearest })
-            })?);
+                let kind = SpecErrorKind::Undeclared { name, nearest };
+                errors.push(SpecError::new(text, span, kind));
+                if errors.len() >= MOST_ERRORS {
+                    break;
+                }
+            }
+            // Where a name has no meaning the model is not used.
+            table.push(known.unwrap_or(Node::Time));
+        }
+        if !errors.is_empty() {
+            return errors;
         }
         for i in 0..expressions.len() {
             let id = ExpressionId(i as u32);
@@ -237,7 +249,7 @@ impl<'a> Symbols<'a> {
                     "`{}`: the derivative of a constant is zero",
                     excerpt(text, span)
                 );
-                return Err(SpecError::new(
+                errors.push(SpecError::new(
                     text,
                     span,
                     SpecErrorKind::Derivative(message),
@@ -252,11 +264,20 @@ impl<'a> Symbols<'a> {
             },
             node => node,
         });
-        Ok(())
+        errors
     }
 }
 
 fn nearest_constant(name: &str) -> Option<String> {
+    match name {
+        "g" => return Some("Modelica.Constants.g_n".into()),
+        "pi" | "Pi" | "PI" => return Some("Modelica.Constants.pi".into()),
+        _ => {}
+    }
+    let exponent = name.strip_prefix(['e', 'E']);
+    if exponent.is_some_and(|e| !e.is_empty() && e.bytes().all(|b| b.is_ascii_digit())) {
+        return Some(format!("1{name}"));
+    }
     let (package, short) = name.rsplit_once('.')?;
     if !package.ends_with("Constants") {
         return None;
@@ -266,7 +287,7 @@ fn nearest_constant(name: &str) -> Option<String> {
 }
 
 /// The candidate that differs least from a name, if it differs in little.
-pub(super) fn nearest<'b>(name: &str, candidates: impl Iterator<Item = &'b str>) -> Option<String> {
+pub(crate) fn nearest<'b>(name: &str, candidates: impl Iterator<Item = &'b str>) -> Option<String> {
     const LONGEST: usize = 64;
     if name.len() > LONGEST {
         return None;

@@ -2,14 +2,52 @@
 
 use super::names::{Imports, Symbols};
 use super::tokens::{Lexer, Token};
-use crate::physics::error::{SpecError, SpecErrorKind, excerpt};
+use crate::physics::error::{MOST_ERRORS, SpecError, SpecErrorKind, excerpt};
 use crate::physics::expression::{ExpressionId, Expressions, Node, Span};
+use std::collections::HashSet;
 
 /// Nodes of all expressions together.
 const MOST_NODES: usize = 2_000_000;
 
 /// How to get rid of what the subset does not have.
 pub(super) const FLATTEN: &str = "flatten the model with OpenModelica (`instantiateModel`, or `omc --flatModelica`) and use what it prints";
+/// Words that start a declaration or another section, and stand in no expression: reading can go on there after an error.
+const STARTS: [&str; 11] = [
+    "constant",
+    "end",
+    "equation",
+    "final",
+    "import",
+    "input",
+    "output",
+    "parameter",
+    "protected",
+    "public",
+    "Real",
+];
+
+/// Words whose construct does not end with the next `;`.
+const BLOCKS: [&str; 18] = [
+    "algorithm",
+    "block",
+    "class",
+    "connector",
+    "expandable",
+    "for",
+    "function",
+    "if",
+    "impure",
+    "initial",
+    "model",
+    "operator",
+    "package",
+    "pure",
+    "record",
+    "type",
+    "when",
+    "while",
+];
+
 pub(super) const ARRAYS: &str = "write one variable for each element, as in `x1`, `x2`, `x3`";
 
 /// An operand: its node and its type.
@@ -49,6 +87,12 @@ pub(super) struct Parser<'a> {
     pub(super) imports: Imports<'a>,
     /// How deep the current expression is nested.
     pub(super) depth: usize,
+    /// Names that are declared so far.
+    pub(super) declared: HashSet<&'a str>,
+    /// Errors behind which reading went on.
+    pub(super) errors: Vec<SpecError>,
+    /// Names in parts that could not be read, which may be declarations.
+    pub(super) unread: HashSet<&'a str>,
 }
 
 impl<'a> Parser<'a> {
@@ -63,6 +107,9 @@ impl<'a> Parser<'a> {
             symbols: Symbols::default(),
             imports: Imports::default(),
             depth: 0,
+            declared: HashSet::new(),
+            errors: vec![],
+            unread: HashSet::new(),
         };
         parser.advance()?;
         Ok(parser)
@@ -105,9 +152,80 @@ impl<'a> Parser<'a> {
         Ok(here)
     }
 
+    /// Keeps an error in a declaration or an equation that starts at `start`, and steps to the next one.
+    ///
+    /// # Errors
+    /// The error itself where what follows would be misread.
+    pub(super) fn recover(&mut self, error: SpecError, start: usize) -> Result<(), SpecError> {
+        let block = matches!(*error.kind, SpecErrorKind::Unsupported { .. })
+            && self.token == Token::Name
+            && BLOCKS.contains(&self.word());
+        let limit = matches!(*error.kind, SpecErrorKind::Limit(_));
+        if block || limit || self.lexer.is_stopped() || self.errors.len() + 1 >= MOST_ERRORS {
+            return Err(error);
+        }
+        self.depth = 0;
+        // A reserved word in the place of a name starts nothing.
+        let mut moved =
+            self.span.start > start && !matches!(*error.kind, SpecErrorKind::Reserved(_));
+        loop {
+            match self.token {
+                Token::End => return Err(error),
+                Token::Sign(";") if self.span.start >= error.span().start => {
+                    self.note_unread(start);
+                    self.errors.push(error);
+                    return self.advance();
+                }
+                Token::Name if moved && STARTS.contains(&self.word()) => {
+                    self.note_unread(start);
+                    self.errors.push(error);
+                    return Ok(());
+                }
+                // A second error in the same part says nothing new.
+                _ => {
+                    if self.advance().is_err() && self.lexer.is_stopped() {
+                        return Err(error);
+                    }
+                    moved = true;
+                }
+            }
+        }
+    }
+
+    /// Notes the names from `start` to the current token.
+    fn note_unread(&mut self, start: usize) {
+        let text = self.text;
+        let part = text.get(start..self.span.start).unwrap_or("");
+        let mut lexer = Lexer::new(part);
+        loop {
+            match lexer.next() {
+                Ok((Token::End, _)) => return,
+                Ok((Token::Name, span)) => {
+                    self.unread.insert(&part[span.start..span.end]);
+                }
+                Ok(_) => {}
+                Err(_) if lexer.is_stopped() => return,
+                Err(_) => {}
+            }
+        }
+    }
+
     pub(super) fn require_sign(&mut self, sign: &str, place: &str) -> Result<(), SpecError> {
         if self.take_sign(sign)? {
             return Ok(());
+        }
+        let between = self.text.get(self.previous_end..self.span.start);
+        let ends_a_line = between.is_some_and(|b| b.contains('\n'));
+        if sign == ";" && ends_a_line && matches!(self.token, Token::Name | Token::End) {
+            let (start, end) = (self.previous_end.saturating_sub(1), self.previous_end);
+            let span = Span { start, end };
+            return Err(self.syntax(span, "a `;` is missing at the end of this line"));
+        }
+        if sign == ";" && self.at_sign(",") {
+            return Err(self.syntax(
+                self.span,
+                "expected `;`, found `,`: a decimal number is written with a point, as in `0.5`",
+            ));
         }
         Err(self.expected(&format!("`{sign}` {place}")))
     }

@@ -164,6 +164,11 @@ fn wrong_expressions_say_what_is_wrong() {
         ("a = b", "a second `=` in one equation: write two equations"),
         ("y2", "`y2` is not declared; did you mean `y`?"),
         ("q", "`q` is not declared"),
+        ("e3", "`e3` is not declared; did you mean `1e3`?"),
+        (
+            "g",
+            "`g` is not declared; did you mean `Modelica.Constants.g_n`?",
+        ),
         ("tme", "`tme` is not declared; did you mean `time`?"),
         (
             "Modelica.Constants.PI",
@@ -211,7 +216,7 @@ fn wrong_texts_say_line_and_column() {
         ),
         (
             "model A\nReal x;\nReal omega;\n Real x;",
-            "line 4, column 7: `x` is declared twice: first in line 2",
+            "line 4, column 7: `x` is declared twice: first in line 2, column 6",
         ),
         (
             "model A\nReal x, omega;\nequation\nder(omega) = -omga; x = 1; end A;",
@@ -390,4 +395,69 @@ end 'My plant';
     assert_eq!(spec.variables[1].unit_text.as_deref(), Some("s"));
     assert_eq!(spec.variables[3].kind, VariableKind::Constant);
     assert_eq!(spec.variables[4].name, "m.w");
+}
+
+#[test]
+fn habits_from_other_languages_are_named() {
+    for (equation, wanted) in [
+        ("y = a(t)", "variables are written without `(t)`: write `a`"),
+        (
+            "y = a(time)",
+            "variables are written without `(time)`: write `a`",
+        ),
+        ("y(t) = a", "variables are written without `(t)`: write `y`"),
+        (
+            "y = a(b + 1)",
+            "`a` is a variable and no function: a product is written `a*(...)`",
+        ),
+        (
+            "der(y, t) = a",
+            "`der` is the derivative with respect to time and takes one name: write `der(y)`",
+        ),
+        (
+            "der(y(t)) = a",
+            "variables are written without `(t)`: write `der(y)`",
+        ),
+        (
+            "y = sin a",
+            "`sin` is a function: its argument stands in parentheses, as in `sin(x)`",
+        ),
+        ("y = a**2", "a power is written with `^`, as in `x^2`"),
+        (
+            "y = 0,5*a",
+            "expected `;`, found `,`: a decimal number is written with a point, as in `0.5`",
+        ),
+        (
+            "y = a \u{2212} b",
+            "the character `\u{2212}` (U+2212) only looks like `-`: write `-`",
+        ),
+        (
+            "y = a % half",
+            "the character `%` has no meaning here: comments start with `//`",
+        ),
+        (
+            "y' = a",
+            "this quoted name has no end: a closing `'` is missing; a derivative is written `der(x)`",
+        ),
+    ] {
+        let text = format!("model A input Real a, b; output Real y; equation {equation}; end A;");
+        let message = parse(&text).map_err(|e| e.kind.to_string()).err();
+        assert_eq!(message.as_deref(), Some(wanted), "{equation}");
+    }
+    for (text, wanted) in [
+        (
+            "model A parameter Real J = 0,5; end A;",
+            "line 1, column 30: a number behind `,`: a decimal number is written with a point, as in `0.5`",
+        ),
+        (
+            "model A model B Real x; end B; B b; end A;",
+            "line 1, column 9: `model` is outside the flat subset of Modelica: flatten the model with OpenModelica (`instantiateModel`, or `omc --flatModelica`) and use what it prints",
+        ),
+        (
+            "model A\n  Real x;\nequation\n  der(x) = -x\nend A;",
+            "line 4, column 13: a `;` is missing at the end of this line",
+        ),
+    ] {
+        assert_eq!(error(text), wanted, "{text}");
+    }
 }

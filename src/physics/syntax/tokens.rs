@@ -24,16 +24,33 @@ const SIGNS: [&str; 30] = [
     ";", ":", "=", "<", ">", "+", "-", "*", "/", "^", ".", "!", "&",
 ];
 
+/// Characters that word processors and web pages put in the place of signs.
+const LOOKALIKES: [(&str, &str); 7] = [
+    ("\u{2212}\u{2013}\u{2014}\u{2010}\u{2011}", "`-`"),
+    ("\u{d7}\u{b7}\u{2217}\u{22c5}", "`*`"),
+    ("\u{f7}\u{2215}", "`/`"),
+    ("\u{201c}\u{201d}\u{201e}\u{2018}\u{2019}", "`\"`"),
+    ("\u{a0}\u{202f}\u{2009}\u{200b}\u{3000}", "a space"),
+    ("\u{2264}", "`<=`"),
+    ("\u{2265}", "`>=`"),
+];
+
 /// Reads token after token.
 pub(super) struct Lexer<'a> {
     text: &'a str,
     at: usize,
+    /// True behind an error after which signs and words cannot be told from the inside of a text or comment.
+    stopped: bool,
 }
 
 impl<'a> Lexer<'a> {
     pub(super) fn new(text: &'a str) -> Self {
         let at = if text.starts_with('\u{feff}') { 3 } else { 0 };
-        Self { text, at }
+        Self {
+            text,
+            at,
+            stopped: false,
+        }
     }
 
     /// The next token.
@@ -76,6 +93,10 @@ impl<'a> Lexer<'a> {
         ))
     }
 
+    pub(super) fn is_stopped(&self) -> bool {
+        self.stopped
+    }
+
     fn byte(&self, ahead: usize) -> Option<u8> {
         self.text.as_bytes().get(self.at + ahead).copied()
     }
@@ -103,6 +124,7 @@ impl<'a> Lexer<'a> {
                         Some(length) => self.at = start + 2 + length + 2,
                         None => {
                             self.at = start + 2;
+                            self.stopped = true;
                             return Err(self
                                 .error(start, "this comment has no end: `*/` is missing".into()));
                         }
@@ -191,10 +213,16 @@ impl<'a> Lexer<'a> {
                 Some(_) => self.at += 1,
                 None => {
                     self.at = start + 1;
+                    self.stopped = true;
+                    let hint = if quote == b'\'' {
+                        "; a derivative is written `der(x)`"
+                    } else {
+                        ""
+                    };
                     let quote = char::from(quote);
                     return Err(self.error(
                         start,
-                        format!("this {what} has no end: a closing `{quote}` is missing"),
+                        format!("this {what} has no end: a closing `{quote}` is missing{hint}"),
                     ));
                 }
             }
@@ -211,6 +239,7 @@ impl<'a> Lexer<'a> {
         let c = rest.chars().next().unwrap_or('?');
         self.at += c.len_utf8();
         let message = if c.is_control() || c == '\u{fffd}' {
+            self.stopped = true;
             format!(
                 "the character U+{:04X} is in no Modelica text: this looks like a binary file",
                 u32::from(c)
@@ -219,6 +248,13 @@ impl<'a> Lexer<'a> {
             format!(
                 "the letter `{c}` is not allowed in a name: names have letters a-z and A-Z, digits and `_`, or stand in \
                  single quotes"
+            )
+        } else if matches!(c, '%' | '#') {
+            format!("the character `{c}` has no meaning here: comments start with `//`")
+        } else if let Some((_, plain)) = LOOKALIKES.iter().find(|l| l.0.contains(c)) {
+            format!(
+                "the character `{c}` (U+{:04X}) only looks like {plain}: write {plain}",
+                u32::from(c)
             )
         } else {
             format!("the character `{c}` has no meaning here")
@@ -316,7 +352,7 @@ mod tests {
             ),
             (
                 "'b",
-                "line 1, column 1: this quoted name has no end: a closing `'` is missing",
+                "line 1, column 1: this quoted name has no end: a closing `'` is missing; a derivative is written `der(x)`",
             ),
             (
                 "\u{0}",

@@ -3,6 +3,7 @@
 //! What is not known for certain matches everything: variables without a unit, and numbers that may carry one.
 
 use super::Unit;
+use super::words::Words;
 use crate::physics::error::{SpecError, SpecErrorKind, excerpt};
 use crate::physics::expression::{Binary, ExpressionId, Function, Node, Span};
 use crate::physics::spec::ModelSpec;
@@ -55,11 +56,17 @@ impl Known {
 /// # Errors
 /// The first two parts, in the order of the text, that are of different dimension.
 pub fn check_units(spec: &ModelSpec) -> Result<(), SpecError> {
+    unit_conflicts(spec).into_iter().next().map_or(Ok(()), Err)
+}
+
+/// All conflicts that [`check_units`] looks for, in the order of the text. What is made of parts in conflict is not compared.
+pub fn unit_conflicts(spec: &ModelSpec) -> Vec<SpecError> {
     let mut checker = Checker {
         spec,
+        words: Words::new(spec),
         used: used(spec),
         known: vec![Known::Nothing; spec.expressions.len()],
-        first: None,
+        conflicts: vec![],
     };
     for index in 0..spec.expressions.len() {
         if checker.used[index] {
@@ -69,10 +76,13 @@ pub fn check_units(spec: &ModelSpec) -> Result<(), SpecError> {
     }
     checker.equations();
     checker.values();
-    checker.first.map_or(Ok(()), |(at, message)| {
+    let mut conflicts = checker.conflicts;
+    conflicts.sort_by_key(|c| c.0.start);
+    let error = |(at, message)| {
         let kind = SpecErrorKind::UnitConflict(message);
-        Err(SpecError::new(&spec.text, at, kind))
-    })
+        SpecError::new(&spec.text, at, kind)
+    };
+    conflicts.into_iter().map(error).collect()
 }
 
 /// The nodes that stand in the text, as opposed to those made by solving.
@@ -99,10 +109,11 @@ fn used(spec: &ModelSpec) -> Vec<bool> {
 
 struct Checker<'a> {
     spec: &'a ModelSpec,
+    words: Words<'a>,
     used: Vec<bool>,
     known: Vec<Known>,
-    /// The conflict that stands first in the text.
-    first: Option<(Span, String)>,
+    /// Where they stand, and what is said about them.
+    conflicts: Vec<(Span, String)>,
 }
 
 impl Checker<'_> {
@@ -112,19 +123,26 @@ impl Checker<'_> {
 
     /// A unit in the words of the model where they state it.
     fn unit_text(&self, id: ExpressionId, unit: Unit) -> String {
-        if let Node::Variable(v) = self.spec.expressions.node(id)
-            && let Some(text) = &self.spec.variable(v).unit_text
-        {
-            return crate::physics::error::shortened(text);
+        self.words.unit_text(id, unit)
+    }
+
+    /// What the units of products are made of: "; `k*x` is N/m times m = N", or nothing.
+    fn made_of(&self, parts: &[(ExpressionId, Unit)]) -> String {
+        let each = parts.iter().filter_map(|&(id, unit)| {
+            let factors = self.words.factors(id)?;
+            let whole = self.words.readable(unit);
+            Some(format!("`{}` is {factors} = {whole}", self.text(id)))
+        });
+        let each: Vec<String> = each.collect();
+        match each.as_slice() {
+            [] => String::new(),
+            some => format!("; {}", some.join(" and ")),
         }
-        unit.to_string()
     }
 
     fn conflict(&mut self, at: ExpressionId, message: String) {
         let span = self.spec.expressions.span(at);
-        if self.first.as_ref().is_none_or(|f| span.start < f.0.start) {
-            self.first = Some((span, message));
-        }
+        self.conflicts.push((span, message));
     }
 
     fn examine(&mut self, id: ExpressionId) -> Known {
@@ -188,9 +206,10 @@ impl Checker<'_> {
                     && !unit.is_one()
                 {
                     let message = format!(
-                        "`{}`: the argument is {}, and has to be a pure number",
+                        "`{}`: the argument is {}, and has to be a pure number{}",
                         self.text(id),
-                        self.unit_text(a, unit)
+                        self.unit_text(a, unit),
+                        self.made_of(&[(a, unit)])
                     );
                     self.conflict(id, message);
                 }
@@ -252,10 +271,11 @@ impl Checker<'_> {
             && !u.same(&v)
         {
             let message = format!(
-                "`{}`: {} {word} {}{end}",
+                "`{}`: {} {word} {}{end}{}",
                 self.text(id),
                 self.unit_text(a, u),
-                self.unit_text(b, v)
+                self.unit_text(b, v),
+                self.made_of(&[(a, u), (b, v)])
             );
             self.conflict(id, message);
             return Known::Nothing;
@@ -288,9 +308,10 @@ impl Checker<'_> {
             && !unit.is_one()
         {
             let message = format!(
-                "`{}`: the exponent is {}, and has to be a pure number",
+                "`{}`: the exponent is {}, and has to be a pure number{}",
                 self.text(id),
-                self.unit_text(exponent, unit)
+                self.unit_text(exponent, unit),
+                self.made_of(&[(exponent, unit)])
             );
             self.conflict(id, message);
             return Known::Nothing;
@@ -318,10 +339,11 @@ impl Checker<'_> {
                 && !u.same(&v)
             {
                 let message = format!(
-                    "`{}`: {} on the left and {} on the right",
+                    "`{}`: {} on the left and {} on the right{}",
                     excerpt(&self.spec.text, equation.span),
                     self.unit_text(left, u),
-                    self.unit_text(right, v)
+                    self.unit_text(right, v),
+                    self.made_of(&[(left, u), (right, v)])
                 );
                 self.conflict(left, message);
             }
@@ -338,11 +360,12 @@ impl Checker<'_> {
                     && !unit.same(&declared)
                 {
                     let message = format!(
-                        "`{}`, the {what} of `{}`: {}, and the variable is in {}",
+                        "`{}`, the {what} of `{}`: {}, and the variable is in {}{}",
                         self.text(value),
                         variable.name,
                         self.unit_text(value, unit),
-                        variable.unit_text.as_deref().unwrap_or("1")
+                        variable.unit_text.as_deref().unwrap_or("1"),
+                        self.made_of(&[(value, unit)])
                     );
                     self.conflict(value, message);
                 }

@@ -126,6 +126,31 @@ const PREFIXES: [&str; 22] = [
 /// Parentheses inside each other.
 const DEEPEST: usize = 16;
 
+/// Symbols of [`PREFIXED`] that are no coherent units of the SI.
+const SCALED: [&str; 11] = [
+    "g", "l", "L", "t", "bar", "eV", "VA", "var", "Wh", "Ah", "ohm",
+];
+
+/// True for a unit of symbols that have neither a prefix nor another scale: products of them are coherent.
+pub(super) fn is_coherent(text: &str) -> bool {
+    let coherent = |symbol: &str| {
+        matches!(symbol, "" | "kg")
+            || (!SCALED.contains(&symbol) && PREFIXED.iter().any(|p| p.0 == symbol))
+    };
+    text.split(|c: char| !(c.is_alphabetic() || matches!(c, '%' | '°' | '_')))
+        .all(coherent)
+}
+
+/// Symbols that a misspelt one may stand for.
+pub(super) fn usual() -> impl Iterator<Item = &'static str> {
+    const WITH_PREFIX: [&str; 16] = [
+        "kg", "mm", "cm", "km", "ms", "kN", "kW", "MW", "mV", "kV", "mA", "kPa", "MPa", "mbar",
+        "kJ", "kHz",
+    ];
+    let single = PREFIXED.iter().chain(&ALONE).map(|s| s.0);
+    single.chain(WITH_PREFIX)
+}
+
 /// Reads `kg.m2/(s3.A)`.
 pub(super) fn parse(text: &str) -> Option<Unit> {
     if text.is_empty() || text.len() > 200 {

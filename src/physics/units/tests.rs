@@ -69,7 +69,8 @@ fn units_are_written() {
         ("rad/s", "1/s"),
         ("m/s2", "m/s2"),
         ("kg.m2", "m2.kg"),
-        ("W/(m2.K)", "kg/(s3.K)"),
+        ("W/(m2.K)", "W/(m2.K)"),
+        ("J/kg", "m2/s2"),
         ("%", "1"),
         ("m^(1/2)", "m^0.5"),
         ("mV", "V"),
@@ -151,17 +152,17 @@ fn conflicts_are_in_the_words_of_the_model() {
         (
             "J*der(w) = tau + d*w*w",
             "1",
-            "line 8, column 12: unit conflict: `tau + d*w*w`: N.m plus W",
+            "line 8, column 12: unit conflict: `tau + d*w*w`: N.m plus W; `d*w*w` is N.m.s/rad times rad/s times rad/s = W",
         ),
         (
             "J*der(w) = u",
             "1",
-            "line 8, column 1: unit conflict: `J*der(w) = u`: N.m on the left and V on the right",
+            "line 8, column 1: unit conflict: `J*der(w) = u`: N.m on the left and V on the right; `J*der(w)` is kg.m2 times rad/s2 = N.m",
         ),
         (
             "u = J*der(w)",
             "1",
-            "line 8, column 1: unit conflict: `u = J*der(w)`: V on the left and N.m on the right",
+            "line 8, column 1: unit conflict: `u = J*der(w)`: V on the left and N.m on the right; `J*der(w)` is kg.m2 times rad/s2 = N.m",
         ),
         (
             "J*der(w) = tau*sin(l)",
@@ -196,12 +197,12 @@ fn conflicts_are_in_the_words_of_the_model() {
         (
             "J*der(w) = 2*u",
             "1",
-            "line 8, column 1: unit conflict: `J*der(w) = 2*u`: N.m on the left and V on the right",
+            "line 8, column 1: unit conflict: `J*der(w) = 2*u`: N.m on the left and V on the right; `J*der(w)` is kg.m2 times rad/s2 = N.m",
         ),
         (
             "J*der(w) = 0.5*m*g",
             "1",
-            "line 8, column 1: unit conflict: `J*der(w) = 0.5*m*g`: N.m on the left and N on the right",
+            "line 8, column 1: unit conflict: `J*der(w) = 0.5*m*g`: N.m on the left and N on the right; `J*der(w)` is kg.m2 times rad/s2 = N.m and `0.5*m*g` is kg times m/s2 = N",
         ),
         (
             "J*der(w) = tau",
@@ -235,5 +236,53 @@ equation der(x) = 1; end A;";
         .map_err(|e| e.to_string());
     assert!(
         error.is_err_and(|e| e.contains("`a`, the start of `x`: m, and the variable is in kg"))
+    );
+}
+
+#[test]
+fn products_are_explained_by_their_factors() {
+    let text = "model A parameter Real k(unit=\"N/m\") = 1, h(unit=\"W/(m2.K)\") = 1, A(unit=\"m2\") = 1, c(unit=\"J/(kg.K)\") = 1;
+Real x(unit=\"m\"), T(unit=\"degC\"), P(unit=\"W\"), tau(unit=\"N.m\");
+equation der(x) = 1; der(T) = 1; P = 3; tau = RIGHT; end A;";
+    for (right, wanted) in [
+        ("P - k*x", "`P - k*x`: W minus N; `k*x` is N/m times m = N"),
+        (
+            "P + h*A*T/x",
+            "`P + h*A*T/x`: W plus W/m; `h*A*T/x` is W/(m2.K) times m2 times degC per m = W/m",
+        ),
+        ("P - 3*x", "`P - 3*x`: W minus m"),
+    ] {
+        let text = text.replace("RIGHT", right);
+        let error = parse(&text).and_then(|s| check_units(&s));
+        let message = error.map_err(|e| e.kind.to_string());
+        assert_eq!(message, Err(format!("unit conflict: {wanted}")));
+    }
+}
+
+#[test]
+fn unknown_units_are_named_with_the_nearest() {
+    for (unit, nearest) in [
+        ("radd", Some("rad")),
+        ("N.m.s/radd", Some("N.m.s/rad")),
+        ("pa", Some("Pa")),
+        ("radians/second", Some("rad/s")),
+        ("J/kg.K", Some("J/(kg.K)")),
+        ("N m", Some("N.m")),
+        ("kg m^2", Some("kg.m^2")),
+        ("widget", None),
+        ("EUR", None),
+    ] {
+        let text = format!("model A Real phi(unit=\"{unit}\") = 1; end A;");
+        let spec = parse(&text).unwrap_or_else(|e| panic!("{e}"));
+        let unknown = super::unknown_units(&spec);
+        assert_eq!(unknown.len(), 1, "{unit}");
+        assert_eq!(unknown[0].nearest.as_deref(), nearest, "{unit}");
+        assert_eq!((unknown[0].line, unknown[0].column), (1, 14));
+    }
+    let spec =
+        parse("model A Real phi(unit=\"radd\") = 1; end A;").unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(
+        super::unknown_units(&spec)[0].to_string(),
+        "the unit `radd` of `phi` is not known and not compared; did you mean `rad`?"
     );
 }

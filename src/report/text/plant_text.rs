@@ -3,7 +3,7 @@
 use super::number::{percent, probability, significant, with_std};
 use super::table::Table;
 use super::{Style, wrapped};
-use crate::physics::{ModelSpec, Plant, Unknown, VariableKind};
+use crate::physics::{ModelSpec, Plant, Unknown, Variable, VariableKind, unit_conflicts};
 use crate::report::PlantDocument;
 use crate::report::plant_document::FitDocument;
 
@@ -20,76 +20,62 @@ const FREE_RUN_APART: f64 = 2.0;
 pub fn plant_text(plant: &Plant) -> String {
     let spec = &plant.spec;
     let mut out = format!("{}{}\n", spec.name, described(&spec.description));
-    for (title, kind) in [
-        ("States", VariableKind::State),
-        ("Inputs", VariableKind::Input),
-    ] {
-        let variables: Vec<_> = spec.of_kind(kind).collect();
-        if variables.is_empty() {
-            continue;
-        }
-        out += &format!("\n{title}\n");
-        let mut table = Table::new(["name", "unit", "start", "certain", "description"])
-            .flush_left(1)
-            .flush_left(3)
-            .flush_left(4);
-        let starts = plant.start(&plant.nominal());
-        for (i, &v) in variables.iter().enumerate() {
-            let v = spec.variable(v);
-            let state = kind == VariableKind::State;
-            table.row([
-                v.name.clone(),
-                v.unit_text.clone().unwrap_or_default(),
-                if state {
-                    significant(starts[i], 6)
-                } else {
-                    String::new()
-                },
-                if state && v.fixed { "yes" } else { "" }.to_owned(),
-                v.description.clone(),
-            ]);
-        }
-        out += &table.lines();
-    }
-    out += "\nOutputs\n";
-    let mut table = Table::new(["name", "unit", "description"])
-        .flush_left(1)
-        .flush_left(2);
-    for v in spec.outputs() {
+    let start = plant.start(&plant.nominal());
+    let states = spec.states();
+    let mut table = Table::new([
+        "name",
+        "unit",
+        "start",
+        "certain",
+        "min",
+        "max",
+        "description",
+    ])
+    .flush_left(1)
+    .flush_left(3)
+    .flush_left(6);
+    for (&v, start) in states.iter().zip(start) {
         let v = spec.variable(v);
-        table.row([
-            v.name.clone(),
-            v.unit_text.clone().unwrap_or_default(),
-            v.description.clone(),
-        ]);
+        let certain = if v.fixed { "yes" } else { "" };
+        let [name, unit, min, max, description] = cells(v);
+        let start = significant(start, 6);
+        table.row([name, unit, start, certain.to_owned(), min, max, description]);
     }
-    out += &table.lines();
-    let parameters = spec.parameters();
-    if !parameters.is_empty() {
-        out += "\nParameters that may be estimated\n";
-        let mut table = Table::new(["name", "value", "unit", "min", "max", "description"])
-            .flush_left(2)
-            .flush_left(5);
-        for (&v, value) in parameters.iter().zip(plant.nominal().parameters) {
-            let v = spec.variable(v);
-            let bound = |b: f64| {
-                if b.is_finite() {
-                    significant(b, 6)
-                } else {
-                    String::new()
-                }
-            };
-            table.row([
-                v.name.clone(),
-                significant(value, 6),
-                v.unit_text.clone().unwrap_or_default(),
-                bound(v.min),
-                bound(v.max),
-                v.description.clone(),
-            ]);
+    out += &titled("States", &table);
+    for (title, variables) in [("Inputs", spec.inputs()), ("Outputs", spec.outputs())] {
+        let mut table = Table::new(["name", "unit", "min", "max", "description"])
+            .flush_left(1)
+            .flush_left(4);
+        for v in variables {
+            table.row(cells(spec.variable(v)));
         }
-        out += &table.lines();
+        out += &titled(title, &table);
     }
+    let mut table = Table::new(["name", "value", "unit", "min", "max", "description"])
+        .flush_left(2)
+        .flush_left(5);
+    for (v, value) in spec
+        .parameters()
+        .into_iter()
+        .zip(plant.nominal().parameters)
+    {
+        let [name, unit, min, max, description] = cells(spec.variable(v));
+        table.row([name, significant(value, 6), unit, min, max, description]);
+    }
+    out += &titled("Parameters that may be estimated", &table);
+    let mut table = Table::new(["name", "value", "unit", "description"])
+        .flush_left(2)
+        .flush_left(3);
+    for v in spec.of_kind(VariableKind::Constant) {
+        let v = spec.variable(v);
+        let [name, unit, _, _, description] = cells(v);
+        let value = v.number.map_or(String::new(), |n| significant(n, 6));
+        table.row([name, value, unit, description]);
+    }
+    out += &titled(
+        "Constants, and parameters that are certain or follow from others",
+        &table,
+    );
     out += "\nEquations, in the order in which they are computed\n";
     let mut table = Table::new(["determines", "from", "line"]).flush_left(1);
     for equation in &spec.equations {
@@ -103,15 +89,90 @@ pub fn plant_text(plant: &Plant) -> String {
             .map_or(0, |t| t.matches('\n').count());
         let text = squeezed(spec, equation.span.start, equation.span.end);
         let text = if text.chars().count() > LONGEST {
-            text.chars().take(LONGEST).collect::<String>() + " ..."
+            text.chars().take(LONGEST).collect::<String>() + "..."
         } else {
             text
         };
         table.row([what, text, line.to_string()]);
     }
     out += &table.lines();
+    out += &agreement(spec);
     out += &equilibrium(plant);
     out
+}
+
+/// A table under its title; nothing where it has no rows.
+fn titled(title: &str, table: &Table) -> String {
+    if table.is_empty() {
+        return String::new();
+    }
+    format!("\n{title}\n{}", table.lines())
+}
+
+/// Name, unit, lower and upper bound, description.
+fn cells(v: &Variable) -> [String; 5] {
+    let bound = |b: f64| {
+        if b.is_finite() {
+            significant(b, 6)
+        } else {
+            String::new()
+        }
+    };
+    let unit = v.unit_text.clone().unwrap_or_default();
+    let description = v.description.clone();
+    [
+        v.name.clone(),
+        unit,
+        bound(v.min),
+        bound(v.max),
+        description,
+    ]
+}
+
+/// Whether the units agree, and what was not compared.
+fn agreement(spec: &ModelSpec) -> String {
+    const LISTED: usize = 8;
+    let conflicts = unit_conflicts(spec).len();
+    let mut said = match conflicts {
+        _ if spec.variables.iter().all(|v| v.unit.is_none()) => "Units were not checked".to_owned(),
+        0 => "Units agree".to_owned(),
+        1 => "1 unit conflict".to_owned(),
+        n => format!("{n} unit conflicts"),
+    };
+    let without = spec.variables.iter().filter(|v| v.unit_text.is_none());
+    let unknown = spec
+        .variables
+        .iter()
+        .filter(|v| v.unit_text.is_some() && v.unit.is_none());
+    for (names, what) in [
+        (
+            without.map(|v| v.name.as_str()).collect::<Vec<_>>(),
+            "no unit",
+        ),
+        (
+            unknown.map(|v| v.name.as_str()).collect(),
+            "a unit that is not known",
+        ),
+    ] {
+        let (s, verb) = match names.len() {
+            0 => continue,
+            1 => ("", "has"),
+            _ => ("s", "have"),
+        };
+        let shown = names
+            .iter()
+            .take(LISTED)
+            .copied()
+            .collect::<Vec<_>>()
+            .join(", ");
+        let more = if names.len() > LISTED { ", ..." } else { "" };
+        said += &format!(
+            "; {} variable{s} {verb} {what} and fit{} everything: {shown}{more}",
+            names.len(),
+            if names.len() == 1 { "s" } else { "" }
+        );
+    }
+    format!("\n{}", wrapped("", &said))
 }
 
 fn described(text: &str) -> String {
