@@ -35,11 +35,11 @@ pub(super) struct StructureFlags {
     #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "plant")]
     free: Vec<String>,
     /// Inputs between samples
-    #[arg(long, value_enum, requires = "structure")]
+    #[arg(long, value_enum, requires = "structure", conflicts_with = "simulator")]
     hold: Option<HoldFlag>,
     /// Noise at the outputs (free-run), or in the states (innovation: an observer predicts from sample to sample) [default: the
     /// likelier]
-    #[arg(long, value_enum, requires = "structure")]
+    #[arg(long, value_enum, requires = "structure", conflicts_with = "simulator")]
     form: Option<FormFlag>,
     /// Fit the free run by least squares, as if its error were white: closest to the recording, but with standard deviations
     /// that are too small where the error is not white
