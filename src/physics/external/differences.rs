@@ -42,7 +42,7 @@ pub(super) fn slopes(
         })
         .collect::<Option<_>>()?;
     let values = &runs.first()?.point.parameters;
-    let base = answers(plant, runs, &[values.clone()]);
+    let base = answers(plant, runs, std::slice::from_ref(values));
     let base: Vec<Columns> = base
         .into_iter()
         .next()?
