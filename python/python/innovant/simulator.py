@@ -81,13 +81,14 @@ class Simulator:
         """Calls the function, and checks what it returns."""
         samples, count = len(u), len(self.outputs)
         y = np.asarray(self.function(u[:, 0] if u.shape[1] == 1 else u, **values), dtype=float)
+        shape = y.shape
         if y.ndim == 1 and count == 1:
             y = y[:, None]
         if y.shape != (samples, count):
             expected = f"({samples},)" if count == 1 else f"({samples}, {count})"
             names = ", ".join(self.outputs)
             raise _innovant.InnovantError(
-                f"the simulator returned an array of the shape {y.shape}; expected is {expected}: a row for each sample of "
+                f"the simulator returned an array of the shape {shape}; expected is {expected}: a row for each sample of "
                 f"u, and the outputs {names}"
             )
         return np.ascontiguousarray(y)
