@@ -14,6 +14,7 @@
 //! | `responses` | poles, zeros, frequency and step response with their uncertainty |
 //! | `explanation` | `explain` and its answer |
 //! | `plant` | plants in equations |
+//! | `simulator` | Python functions that simulate |
 //! | `moments` | recordings reduced to moments |
 //! | `table` | columns of data frames by role |
 
@@ -27,6 +28,7 @@ mod options;
 mod plant;
 mod records;
 mod responses;
+mod simulator;
 mod table;
 
 use pyo3::prelude::*;
@@ -50,6 +52,7 @@ fn _innovant(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(responses::settling_samples, module)?)?;
     module.add_function(wrap_pyfunction!(responses::step_response, module)?)?;
     module.add_function(wrap_pyfunction!(responses::static_gain, module)?)?;
+    module.add_function(wrap_pyfunction!(simulator::estimate_simulator, module)?)?;
     module.add_function(wrap_pyfunction!(examples::example, module)?)?;
     module.add_function(wrap_pyfunction!(table::find_columns, module)?)?;
     module.add_function(wrap_pyfunction!(table::time_base, module)?)?;

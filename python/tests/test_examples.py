@@ -1,7 +1,12 @@
 """The examples run, and say what they promise."""
 
+import json
 import runpy
+import subprocess
+import sys
 from pathlib import Path
+
+import numpy as np
 
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -38,8 +43,23 @@ def test_fleet_on_dask(capsys, monkeypatch):
     assert "the fleet" in said
 
 
+def test_external_simulator(capsys, monkeypatch, tmp_path):
+    fitted, said = run("external_simulator.py", capsys, tmp_path, monkeypatch=monkeypatch)
+    for name, truth in [("k", 0.05), ("a", 0.1), ("h0", 1.3)]:
+        assert abs(fitted.estimates[name].value - truth) < 4 * fitted.estimates[name].std
+    # The same file is the simulator of the command line.
+    (tmp_path / "values.json").write_text(json.dumps(fitted.parameters))
+    files = [tmp_path / "log.csv", tmp_path / "out.csv", tmp_path / "values.json"]
+    subprocess.run([sys.executable, EXAMPLES / "external_simulator.py", *files], check=True)
+    table = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)
+    u = np.loadtxt(tmp_path / "log.csv", delimiter=",", skiprows=1)[:, 1]
+    np.testing.assert_allclose(table[:, 1], fitted.simulate(u)[:, 0], rtol=1e-9)
+    assert "--simulator-parameters" in said
+
+
 def test_every_example_is_tested():
     assert sorted(p.name for p in EXAMPLES.glob("*.py")) == [
+        "external_simulator.py",
         "fleet_on_dask.py",
         "servo_in_closed_loop.py",
         "simulation_without_friction.py",

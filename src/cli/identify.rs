@@ -9,6 +9,7 @@ use super::model_flags::ModelFlags;
 use super::output::{Output, check_distinct, note, paths, print};
 use super::progress::Progress;
 use super::roles::{RoleFlags, tell_reading};
+use super::simulator::{self, SimulatorFlags};
 use super::structure::{self, StructureFlags};
 use super::terminal::style;
 use super::{Outcome, Verbosity};
@@ -25,6 +26,8 @@ const EXAMPLE: &str = "Examples:
   innovant identify first.csv second.csv           two experiments of one plant
   innovant identify log.csv --order 2..8           compare orders
   innovant identify log.csv --structure plant.mo --output plant.json    parameters of your own equations
+  innovant identify log.csv --simulator 'python3 simulator.py {input} {output} {parameters}' \\
+                    --simulator-parameters parameters.json              parameters of another program
   ssh plant cat log.csv | innovant identify - --dt 0.01 --output - | jq .warnings";
 
 /// Identify a state-space model with its uncertainty from recordings
@@ -43,6 +46,8 @@ pub(super) struct Flags {
     model: ModelFlags,
     #[command(flatten)]
     plant: StructureFlags,
+    #[command(flatten)]
+    simulator: SimulatorFlags,
     /// Write the model to this file, as JSON; `-` is standard output (then without the table)
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -81,6 +86,19 @@ impl Plan {
 }
 
 pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
+    if flags.simulator.asked() {
+        if flags.report.is_some() {
+            anyhow::bail!("--report draws linear models; leave it out with --simulator");
+        }
+        return simulator::run(
+            &flags.simulator,
+            &flags.plant,
+            &flags.logs,
+            &flags.roles,
+            flags.output.as_ref(),
+            say,
+        );
+    }
     if flags.plant.asked() {
         if flags.report.is_some() {
             anyhow::bail!("--report draws linear models; leave it out with --structure");

@@ -120,9 +120,22 @@ pub(super) fn read_recordings(
     } else {
         need
     };
+    read_with(&roles, sources, need, say).map_err(|e| match e.downcast::<LogError>() {
+        Ok(of_names) => other_names(of_names, plant),
+        Err(other) => other,
+    })
+}
+
+/// Reads recordings with these columns; one with gaps is several.
+pub(super) fn read_with(
+    roles: &Roles,
+    sources: &[Source],
+    need: RoleNeed,
+    say: Verbosity,
+) -> anyhow::Result<(Vec<Log>, Vec<Recording>)> {
     let (mut logs, mut recordings) = (Vec::new(), Vec::new());
     for source in sources {
-        let reading = Reading::read(source, &roles, need).map_err(|e| other_names(e, plant))?;
+        let reading = Reading::read(source, roles, need)?;
         tell_reading(&source.to_string(), reading.said.as_deref(), say);
         for log in &reading.logs {
             recordings.push(Recording {

@@ -75,6 +75,20 @@ impl Progress {
         Self { bar: Some(bar) }
     }
 
+    /// A count of runs, how many there will be is not known, if standard error is a terminal.
+    pub(super) fn runs(quiet: bool) -> Self {
+        if quiet || !io::stderr().is_terminal() {
+            return Self { bar: None };
+        }
+        let bar = ProgressBar::new_spinner();
+        if let Ok(style) =
+            ProgressStyle::with_template("{spinner} {pos} runs of the simulator, {elapsed}")
+        {
+            bar.set_style(style);
+        }
+        Self { bar: Some(bar) }
+    }
+
     /// One more of them is done.
     pub(super) fn one_more(&self) {
         if let Some(bar) = &self.bar {

@@ -11,7 +11,7 @@ use super::terminal::style;
 use super::{Outcome, Verbosity};
 use crate::log::{Log, RoleNeed, Source, check_same_sampling};
 use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
-use crate::physics::{Hold, Plant};
+use crate::physics::{Hold, ModelSpec, Simulated};
 use crate::report::text::plant_estimate_text;
 use crate::report::{PlantDocument, plant_fits};
 
@@ -20,35 +20,30 @@ use crate::report::{PlantDocument, plant_fits};
 #[command(next_help_heading = "Plant in equations")]
 pub(super) struct StructureFlags {
     /// Estimate the parameters of this plant (Modelica text) instead of a linear model
-    #[arg(long, value_name = "PLANT")]
+    #[arg(long, value_name = "PLANT", group = "plant")]
     structure: Option<PathBuf>,
-    /// Parameters that keep the value of the text, comma-separated
+    /// Parameters that keep the value of the text (or of --simulator-parameters), comma-separated
     #[arg(
         long,
         value_name = "NAMES",
         value_delimiter = ',',
-        requires = "structure",
+        requires = "plant",
         conflicts_with = "free"
     )]
     fix: Vec<String>,
     /// Only these parameters are estimated
-    #[arg(
-        long,
-        value_name = "NAMES",
-        value_delimiter = ',',
-        requires = "structure"
-    )]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "plant")]
     free: Vec<String>,
     /// Inputs between samples
-    #[arg(long, value_enum, requires = "structure")]
+    #[arg(long, value_enum, requires = "structure", conflicts_with = "simulator")]
     hold: Option<HoldFlag>,
     /// Noise at the outputs (free-run), or in the states (innovation: an observer predicts from sample to sample) [default: the
     /// likelier]
-    #[arg(long, value_enum, requires = "structure")]
+    #[arg(long, value_enum, requires = "structure", conflicts_with = "simulator")]
     form: Option<FormFlag>,
     /// Fit the free run by least squares, as if its error were white: closest to the recording, but with standard deviations
     /// that are too small where the error is not white
-    #[arg(long, requires = "structure", conflicts_with = "form")]
+    #[arg(long, requires = "plant", conflicts_with = "form")]
     least_squares: bool,
 }
 
@@ -80,6 +75,16 @@ impl StructureFlags {
     pub fn asked(&self) -> bool {
         self.structure.is_some()
     }
+
+    /// Whether noise is taken as white.
+    pub fn least_squares(&self) -> bool {
+        self.least_squares
+    }
+
+    /// Which parameters are free.
+    pub fn free_parameters(&self, plant: &dyn Simulated) -> anyhow::Result<Vec<bool>> {
+        free(plant.spec(), self)
+    }
 }
 
 /// Estimates the plant of `--structure` from `logs`.
@@ -102,7 +107,7 @@ pub(super) fn run(
     let plant = &loaded.plant;
     let hold = flags.hold.map_or(loaded.hold, Hold::from);
     let options = EstimateOptions {
-        free: free(plant, flags)?,
+        free: flags.free_parameters(plant)?,
         hold,
         form: flags.form.map(|f| match f {
             FormFlag::FreeRun => Form::FreeRun,
@@ -126,28 +131,38 @@ pub(super) fn run(
     document.fit = plant_fits(plant, &records, &logs, &estimated, hold);
     document.sample_time = logs.first().map(|l| l.sample_time);
     document.recordings = recordings;
-    if let Some(output) = &output {
-        output.write(&document.to_json()?)?;
-    }
-    if say.quiet || output.as_ref().is_some_and(Output::is_stdout) {
-        return Ok(Outcome::Done);
-    }
     let samples: usize = logs.iter().map(Log::samples).sum();
     let title = format!("{} from {samples} samples", plant.spec.name);
-    print(&plant_estimate_text(&document, &title, style()))?;
-    if let Some(output) = &output {
-        print(&format!("\nwritten to {}\n", output.path().display()))?;
-    }
+    write_and_tell(&document, &title, output.as_ref(), say)?;
     Ok(Outcome::Done)
 }
 
+/// Writes the document, and says what was estimated.
+pub(super) fn write_and_tell(
+    document: &PlantDocument,
+    title: &str,
+    output: Option<&Output>,
+    say: Verbosity,
+) -> anyhow::Result<()> {
+    if let Some(output) = output {
+        output.write(&document.to_json()?)?;
+    }
+    if say.quiet || output.is_some_and(Output::is_stdout) {
+        return Ok(());
+    }
+    print(&plant_estimate_text(document, title, style()))?;
+    if let Some(output) = output {
+        print(&format!("\nwritten to {}\n", output.path().display()))?;
+    }
+    Ok(())
+}
+
 /// Which parameters are free.
-fn free(plant: &Plant, flags: &StructureFlags) -> anyhow::Result<Vec<bool>> {
-    let names: Vec<&str> = plant
-        .spec
+fn free(spec: &ModelSpec, flags: &StructureFlags) -> anyhow::Result<Vec<bool>> {
+    let names: Vec<&str> = spec
         .parameters()
         .into_iter()
-        .map(|v| plant.spec.variable(v).name.as_str())
+        .map(|v| spec.variable(v).name.as_str())
         .collect();
     for (flag, asked) in [("--fix", &flags.fix), ("--free", &flags.free)] {
         if let Some(name) = asked.iter().find(|n| !names.contains(&n.as_str())) {

@@ -2,12 +2,15 @@
 //!
 //! ```text
 //! text ── syntax, sort ──> ModelSpec ── simulation ──> Plant ── simulate, linearise ──> outputs and sensitivities ── estimate ──> parameters
+//! another program ── external ──> outputs, and sensitivities by differences ────────────────────────────────┘
 //! ```
 
 mod error;
 pub mod estimate;
 mod expression;
+pub mod external;
 mod modelica;
+mod simulated;
 mod simulation;
 mod sort;
 mod spec;
@@ -16,6 +19,7 @@ mod units;
 
 pub use error::{SpecError, SpecErrorKind};
 pub use expression::{Binary, ExpressionId, Expressions, Function, Node, Span, VariableId};
+pub use simulated::{Run, RunError, Simulated, Slopes};
 pub use simulation::{
     Direction, Excitation, Hold, LinearPlant, Observer, Plan, Plant, Point, SimulationError,
     Trajectory,

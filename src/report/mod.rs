@@ -12,6 +12,7 @@
 //! | `overview`       | envelopes and spectra of a recording, gathered while it is read   |
 //! | `plant_fit`      | how an estimated plant follows its recordings                     |
 //! | `plant_document` | the keys of `innovant-plant/1`                                    |
+//! | `simulator_document` | the external simulator in it                                 |
 //! | `reproduction_csv` | all numbers of a reproduction as one long table                 |
 //!
 //! # The same input gives the same bytes
@@ -38,6 +39,7 @@ mod read_explanation;
 mod reproduction_csv;
 mod request;
 mod schema;
+mod simulator_document;
 pub mod text;
 
 pub use channels::{InputDocument, OutputDocument};
@@ -61,3 +63,4 @@ pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
 pub use reproduction_csv::reproduction_csv;
 pub use request::Request;
 pub use schema::{explanation_schema, model_schema, plant_schema, reproduction_schema};
+pub use simulator_document::SimulatorDocument;

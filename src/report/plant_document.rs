@@ -8,9 +8,10 @@ use super::json::to_json;
 use super::location::position_of;
 use super::matrix::Rows;
 use super::read::{broken, no_document};
+use super::simulator_document::SimulatorDocument;
 use crate::identify::Recording;
 use crate::physics::estimate::{Form, PlantEstimate, Question};
-use crate::physics::{Hold, Plant, Point, parse};
+use crate::physics::{Hold, Plant, Point, Simulated, parse};
 
 /// Kind and version of the document.
 pub const PLANT_FORMAT: &str = "innovant-plant/1";
@@ -22,8 +23,12 @@ pub struct PlantDocument {
     /// `innovant-plant/1`.
     #[schemars(extend("const" = PLANT_FORMAT))]
     pub format: String,
-    /// The equations, in flat Modelica.
+    /// The equations, in flat Modelica; empty for an external simulator.
+    #[serde(default)]
     pub text: String,
+    /// The external simulator, where the plant has no equations.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulator: Option<SimulatorDocument>,
     /// How inputs behave between samples: `zero` holds them, `linear` joins them.
     #[serde(default)]
     pub hold: String,
@@ -81,7 +86,7 @@ pub struct ParameterDocument {
     /// Unit as declared.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// Value in the text.
+    /// Value in the text, or the one that was given with an external simulator.
     #[serde(default)]
     pub text_value: Option<f64>,
     /// Estimate.
@@ -167,8 +172,8 @@ fn finite(value: f64) -> Option<f64> {
 
 impl PlantDocument {
     /// The document of an estimate; fits and recordings are added by the caller.
-    pub fn new(plant: &Plant, estimate: &PlantEstimate, hold: Hold) -> Self {
-        let spec = &plant.spec;
+    pub fn new(plant: &dyn Simulated, estimate: &PlantEstimate, hold: Hold) -> Self {
+        let spec = plant.spec();
         let (parameters, states) = (spec.parameters(), spec.states());
         let nominal = plant.nominal();
         let name = |v| spec.variable(v).column().to_owned();
@@ -177,6 +182,7 @@ impl PlantDocument {
         Self {
             format: PLANT_FORMAT.to_owned(),
             text: spec.text.clone(),
+            simulator: None,
             hold: if hold == Hold::Linear {
                 "linear"
             } else {
@@ -301,6 +307,12 @@ impl PlantDocument {
             key: key.to_owned(),
             message,
         };
+        if let Some(simulator) = &document.simulator {
+            simulator
+                .check(&document.parameters)
+                .map_err(|message| content("simulator", message))?;
+            return Ok(document);
+        }
         let spec =
             parse(&document.text).map_err(|e| content("text", format!("the equations: {e}")))?;
         for p in &document.parameters {
@@ -323,6 +335,9 @@ impl PlantDocument {
     /// # Errors
     /// When the text cannot be read, in words.
     pub fn plant(&self) -> Result<(Plant, Point), String> {
+        if let Some(simulator) = &self.simulator {
+            return Err(simulator.has_no_equations());
+        }
         let plant = Plant::new(parse(&self.text).map_err(|e| e.to_string())?);
         let mut point = plant.nominal();
         let parameters = plant.spec.parameters();

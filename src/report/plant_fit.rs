@@ -4,7 +4,7 @@ use super::plant_document::FitDocument;
 use crate::identify::{Options, identify};
 use crate::log::Log;
 use crate::physics::estimate::{HELD_OUT_FROM, PlantEstimate, PlantRecording};
-use crate::physics::{Excitation, Hold, Plant};
+use crate::physics::{Excitation, Hold, Simulated};
 
 /// `100 (1 - |y - s| / |y - mean y|)` over several recordings, and the root mean square of the error.
 fn fit(pairs: &[(&[f64], &[f64])]) -> (f64, f64) {
@@ -24,13 +24,13 @@ fn fit(pairs: &[(&[f64], &[f64])]) -> (f64, f64) {
 /// Fits in free run of the estimate, of the values of the text, and of the best linear model: one an output. `logs` are the
 /// recordings again, for the linear model.
 pub fn plant_fits(
-    plant: &Plant,
+    plant: &dyn Simulated,
     records: &[PlantRecording],
     logs: &[Log],
     estimate: &PlantEstimate,
     hold: Hold,
 ) -> Vec<FitDocument> {
-    let outputs = plant.spec.outputs();
+    let outputs = plant.spec().outputs();
     let l = outputs.len();
     let text: Vec<Option<Vec<Vec<f64>>>> = records
         .iter()
@@ -44,7 +44,7 @@ pub fn plant_fits(
                 hold,
             };
             plant
-                .simulate(&plant.nominal(), &excitation, None)
+                .first_run(&plant.nominal(), &excitation)
                 .ok()
                 .map(|t| t.outputs)
         })
@@ -73,7 +73,7 @@ pub fn plant_fits(
                 fit(&later.collect::<Vec<_>>()).0
             };
             FitDocument {
-                output: plant.spec.variable(outputs[o]).column().to_owned(),
+                output: plant.spec().variable(outputs[o]).column().to_owned(),
                 free_run_percent: percent,
                 rms_error: rms,
                 text_percent: of_text.map(|t| fit(&measured(o).zip(t).collect::<Vec<_>>()).0),

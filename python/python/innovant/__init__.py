@@ -13,12 +13,14 @@ from .explanation import Explanation, explain
 from .identification import identify
 from .model import Model
 from .moments import Moments
-from .plant import Plant, PlantEstimate
+from .plant import Estimate, Plant, PlantEstimate
 from .record import Record
 from .responses import FrequencyResponse, Roots, StepResponse
+from .simulator import Simulator, SimulatorEstimate
 from .validation import Validation
 
 __all__ = [
+    "Estimate",
     "Explanation",
     "FrequencyResponse",
     "InnovantError",
@@ -28,6 +30,8 @@ __all__ = [
     "PlantEstimate",
     "Record",
     "Roots",
+    "Simulator",
+    "SimulatorEstimate",
     "StepResponse",
     "Validation",
     "__version__",

@@ -1,6 +1,6 @@
 """The native part: what the Python files of this package are made of. Not part of the interface."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,6 +121,18 @@ def settling_samples(model: Model, most: int) -> int: ...
 def step_response(model: Model, count: int) -> tuple[_Array, _Array | None]: ...
 def static_gain(model: Model) -> tuple[_Array, _Array | None] | None: ...
 def example(name: str, count: int, seed: int) -> tuple[_Array, _Array, float]: ...
+def estimate_simulator(
+    function: Callable[[_Array, dict[str, float]], _Array],
+    name: str,
+    inputs: list[str],
+    outputs: list[str],
+    parameters: list[tuple[str, float, float, float]],
+    u: list[_Array],
+    y: list[_Array],
+    dt: float,
+    fix: list[str],
+    least_squares: bool,
+) -> tuple[str, str]: ...
 def find_columns(
     headers: Sequence[str],
     inputs: Sequence[str] | None,

@@ -134,11 +134,10 @@ class Plant:
         return self._plant.text()
 
 
-class PlantEstimate(Plant):
-    """A plant with estimated parameters."""
+class Estimate:
+    """What was estimated: of a plant in equations, or of a simulator."""
 
     def __init__(self, document: str, text: str) -> None:
-        super().__init__(document)
         self._json = document
         self._text = text
         #: The document ``innovant-plant/1``.
@@ -163,3 +162,11 @@ class PlantEstimate(Plant):
 
     def __str__(self) -> str:
         return self._text
+
+
+class PlantEstimate(Estimate, Plant):
+    """A plant with estimated parameters."""
+
+    def __init__(self, document: str, text: str) -> None:
+        Estimate.__init__(self, document, text)
+        Plant.__init__(self, document)

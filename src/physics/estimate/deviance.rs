@@ -4,9 +4,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Form;
 use super::optimise::{Objective, RIDGE};
+use super::problem::Columns;
 use super::problem::Problem;
 use crate::noise::{Colour, Noise, Series};
-use crate::physics::simulation::{Direction, Observer, Plan, Trajectory};
+use crate::physics::simulated::Run;
+use crate::physics::simulation::{Direction, Observer, Plan, Point, Trajectory};
 
 /// Runs of all recordings at a point.
 #[derive(Clone)]
@@ -14,6 +16,28 @@ struct Runs {
     at: Vec<f64>,
     plans: Vec<Plan>,
     residual: Series,
+}
+
+/// A run of each recording.
+fn prepare<'r>(
+    problem: &Problem,
+    points: &'r [Point],
+    columns: &'r [Columns<'r>],
+    gain: Option<&'r DMatrix<f64>>,
+    plans: &'r [Plan],
+) -> Vec<Run<'r>> {
+    let each = problem.recordings.iter().zip(points).zip(columns);
+    each.zip(plans)
+        .map(|(((recording, point), columns), plan)| Run {
+            point,
+            excitation: problem.excitation(recording, columns),
+            observer: gain.map(|gain| Observer {
+                gain,
+                recorded: &columns.outputs,
+            }),
+            plan,
+        })
+        .collect()
 }
 
 /// The deviance in one form with a given noise model.
@@ -44,24 +68,9 @@ impl<'p, 'a> Deviance<'p, 'a> {
         let gain = self.gain(point);
         let problem = self.problem;
         let points = problem.points(point);
-        problem
-            .recordings
-            .iter()
-            .zip(points)
-            .zip(&problem.plans)
-            .map(|((r, p), plan)| {
-                let columns = r.columns();
-                let observer = gain.as_ref().map(|gain| Observer {
-                    gain,
-                    recorded: &columns.outputs,
-                });
-                let excitation = problem.excitation(r, &columns);
-                problem
-                    .plant
-                    .simulate_as(&p, &excitation, observer.as_ref(), plan)
-                    .ok()
-            })
-            .collect()
+        let columns = problem.columns();
+        let runs = prepare(problem, &points, &columns, gain.as_ref(), &problem.plans);
+        problem.plant.run(&runs).ok()
     }
 
     fn run(&self, point: &[f64]) -> Option<Runs> {
@@ -141,25 +150,11 @@ impl<'p, 'a> Deviance<'p, 'a> {
         let rows = problem.count();
         let mut matrix = DMatrix::zeros(rows, runs.at.len());
         let mut row = 0;
-        for (r, (recording, point)) in problem
-            .recordings
-            .iter()
-            .zip(problem.points(&runs.at))
-            .enumerate()
-        {
-            let columns = recording.columns();
-            let observer = gain.as_ref().map(|gain| Observer {
-                gain,
-                recorded: &columns.outputs,
-            });
-            let excitation = problem.excitation(recording, &columns);
-            let slopes = problem.plant.sensitivities(
-                &point,
-                &excitation,
-                observer.as_ref(),
-                &runs.plans[r],
-                &directions,
-            );
+        let points = problem.points(&runs.at);
+        let columns = problem.columns();
+        let prepared = prepare(problem, &points, &columns, gain.as_ref(), &runs.plans);
+        let slopes = problem.plant.slopes(&prepared, &directions)?;
+        for (r, slopes) in slopes.iter().enumerate() {
             let mask = &problem.mask[r * l..(r + 1) * l];
             let mut height = 0;
             for d in 0..directions.len() {

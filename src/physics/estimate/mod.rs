@@ -23,7 +23,8 @@ use nalgebra::DMatrix;
 use self::deviance::Deviance;
 use self::optimise::{Effort, Range, minimise};
 use self::problem::Problem;
-use super::simulation::{Hold, Plant, Point};
+use super::simulated::Simulated;
+use super::simulation::{Hold, Point};
 use crate::noise::Noise;
 
 /// How the predictions of a plant are formed.
@@ -120,6 +121,11 @@ const GLANCE: Effort = Effort {
     iterations: 6,
     settled: 1.0,
 };
+/// The same where a run takes seconds.
+const COSTLY_GLANCE: Effort = Effort {
+    iterations: 2,
+    settled: 1.0,
+};
 /// Factors of the observer's gain on the way to free run, and the effort at each.
 const WEAKER: [f64; 10] = [0.6, 0.35, 0.2, 0.1, 0.05, 0.025, 0.012, 0.006, 0.003, 0.001];
 const CONTINUED: Effort = Effort {
@@ -145,17 +151,18 @@ pub const HELD_OUT_FROM: f64 = 2.0 / 3.0;
 /// Level at which residuals are said to depend on the inputs.
 const NOISE: f64 = 1e-3;
 
-/// Estimates a plant from recordings of it.
+/// Estimates a plant, in equations or as an external simulator, from recordings of it. External simulators have no states that
+/// an observer could correct: they are estimated in free run.
 ///
 /// # Errors
 /// When nothing is free, the recordings do not fit the plant, or the plant cannot be simulated at any start.
 pub fn estimate(
-    plant: &Plant,
+    plant: &dyn Simulated,
     recordings: &[PlantRecording],
     options: &EstimateOptions,
 ) -> Result<PlantEstimate, EstimateError> {
     let problem = Problem::new(plant, recordings, options)?;
-    let form = if options.least_squares {
+    let form = if options.least_squares || plant.equations().is_none() {
         Some(Form::FreeRun)
     } else {
         options.form
@@ -201,9 +208,15 @@ pub fn estimate(
         (Some(a), Some(b)) if b.criterion < a.criterion => (b, Some(a.criterion)),
         (Some(a), b) => (a, b.map(|b| b.criterion)),
         (None, Some(b)) => (b, None),
-        (None, None) => return Err(problem.why_not()),
+        (None, None) => return Err(stopped(plant).unwrap_or_else(|| problem.why_not())),
     };
-    Ok(finish(&problem, best, other))
+    let estimate = finish(&problem, best, other);
+    stopped(plant).map_or(Ok(estimate), Err)
+}
+
+/// Why an external simulator asks to end, whatever was found until then.
+fn stopped(plant: &dyn Simulated) -> Option<EstimateError> {
+    plant.stopped().map(EstimateError::from)
 }
 
 /// A fit in one of the forms.
@@ -291,7 +304,8 @@ fn fit_free_run(problem: &Problem) -> Option<Fit> {
     if best.as_ref().is_some_and(|fit| leaves_noise(problem, fit)) {
         return best;
     }
-    if let Some((deviance, point)) = grown_fit(problem)
+    if !problem.plant.costly()
+        && let Some((deviance, point)) = grown_fit(problem)
         && deviance < highest - SAME_SUMMIT
     {
         highest = deviance;
@@ -305,9 +319,14 @@ fn fit_free_run(problem: &Problem) -> Option<Fit> {
     let short = problem.with_recordings(&recordings);
     let mut tried: Vec<(f64, Vec<f64>)> = Vec::new();
     let draws = (GLANCED_VALUES / short.count().max(1)).clamp(LEAST_DRAWS, MOST_DRAWS);
+    let (draws, glance) = if problem.plant.costly() {
+        (LEAST_DRAWS, COSTLY_GLANCE)
+    } else {
+        (draws, GLANCE)
+    };
     let draws = problem.draws(draws).into_iter().map(|d| (d, None));
     for (mut point, held) in problem.without_terms().into_iter().chain(draws) {
-        if let Some(deviance) = white_fit_holding(&short, &mut point, GLANCE, held) {
+        if let Some(deviance) = white_fit_holding(&short, &mut point, glance, held) {
             tried.push((deviance, point));
         }
     }
@@ -454,7 +473,11 @@ fn finish(problem: &Problem, fit: Fit, other_criterion: Option<f64>) -> PlantEst
         .simulated(&fit.point)
         .unwrap_or_default();
     let tests = residual_tests(problem, &fit, &innovations, &simulated);
-    let held_out = held_out(problem, &fit);
+    let held_out = if problem.plant.costly() {
+        None
+    } else {
+        held_out(problem, &fit)
+    };
     PlantEstimate {
         points,
         parameters,

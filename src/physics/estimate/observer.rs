@@ -106,7 +106,7 @@ fn mean_linearisation(
     problem: &Problem,
     excitation: &Excitation,
 ) -> Option<(LinearPlant, Vec<f64>, Vec<f64>)> {
-    let plant = &problem.plant;
+    let plant = problem.plant.equations()?;
     let point = plant.nominal();
     let inputs: Vec<f64> = excitation
         .inputs

@@ -1,13 +1,17 @@
 //! What is free in an estimation, and the deviance of the recordings with its derivatives.
 
+use std::sync::Arc;
+
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 
 use super::EstimateOptions;
 use super::optimise::Range;
 use crate::noise::{Colours, Mask, Noise, Series};
-use crate::physics::simulation::{Excitation, Plan, Plant, Point, SimulationError};
-use crate::physics::spec::VariableKind;
+use crate::physics::external::ExternalError;
+use crate::physics::simulated::{RunError, Simulated};
+use crate::physics::simulation::{Excitation, Plan, Point, SimulationError};
+use crate::physics::spec::{ModelSpec, VariableKind};
 
 /// A recording of a plant.
 #[derive(Debug, Clone)]
@@ -54,11 +58,23 @@ pub enum EstimateError {
     /// No start can be simulated.
     #[error("the plant cannot be simulated with the values of the text: {0}")]
     Simulation(#[from] SimulationError),
+    /// An external simulator failed.
+    #[error(transparent)]
+    External(#[from] Box<ExternalError>),
+}
+
+impl From<RunError> for EstimateError {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Equations(error) => Self::Simulation(error),
+            RunError::External(error) => Self::External(error),
+        }
+    }
 }
 
 /// Recordings, plant and what is free.
 pub(super) struct Problem<'a> {
-    pub plant: Plant,
+    pub plant: Arc<dyn Simulated>,
     pub recordings: &'a [PlantRecording],
     options: &'a EstimateOptions,
     pub mask: Mask,
@@ -98,16 +114,13 @@ fn mask(recordings: &[PlantRecording]) -> Mask {
         .collect()
 }
 
-/// Error of a step while parameters are sought: residuals are larger by orders of magnitude than what adds up from it.
-const STEP_ACCURACY: f64 = 1e-7;
-
 impl<'a> Problem<'a> {
     pub fn new(
-        plant: &'a Plant,
+        plant: &dyn Simulated,
         recordings: &'a [PlantRecording],
         options: &'a EstimateOptions,
     ) -> Result<Self, EstimateError> {
-        let spec = &plant.spec;
+        let spec = plant.spec();
         let (inputs, outputs) = (spec.inputs().len(), spec.outputs().len());
         if recordings.is_empty() || recordings.iter().any(|r| r.samples() == 0) {
             return Err(EstimateError::Empty);
@@ -135,7 +148,7 @@ impl<'a> Problem<'a> {
             .filter(|&i| !spec.variable(states[i]).fixed)
             .collect();
         let nominal = plant.nominal();
-        let plant = plant.with_accuracy(STEP_ACCURACY);
+        let plant = plant.for_search();
         let mut problem = Self {
             plant,
             recordings,
@@ -156,8 +169,7 @@ impl<'a> Problem<'a> {
             .iter()
             .map(|r| {
                 let columns = r.columns();
-                let run = plant.simulate(&problem.nominal, &problem.excitation(r, &columns), None);
-                run.map(|t| t.plan).unwrap_or_default()
+                plant.plan(&problem.nominal, &problem.excitation(r, &columns))
             })
             .collect();
         Ok(problem)
@@ -202,12 +214,20 @@ impl<'a> Problem<'a> {
             let columns = r.columns();
             if let Err(e) = self
                 .plant
-                .simulate(&self.nominal, &self.excitation(r, &columns), None)
+                .first_run(&self.nominal, &self.excitation(r, &columns))
             {
-                return EstimateError::Simulation(e);
+                return e.into();
             }
         }
         EstimateError::Empty
+    }
+
+    /// Columns of each recording.
+    pub fn columns(&self) -> Vec<Columns<'_>> {
+        self.recordings
+            .iter()
+            .map(PlantRecording::columns)
+            .collect()
     }
 
     pub fn excitation<'b>(&self, r: &PlantRecording, columns: &'b Columns<'b>) -> Excitation<'b> {
@@ -220,12 +240,16 @@ impl<'a> Problem<'a> {
         }
     }
 
+    fn spec(&self) -> &ModelSpec {
+        self.plant.spec()
+    }
+
     pub fn outputs(&self) -> usize {
-        self.plant.spec.outputs().len()
+        self.spec().outputs().len()
     }
 
     pub fn states(&self) -> usize {
-        self.plant.spec.states().len()
+        self.spec().states().len()
     }
 
     /// Values that count.
@@ -249,7 +273,7 @@ impl<'a> Problem<'a> {
 
     /// Bounds of the free numbers.
     pub fn ranges(&self) -> Vec<Range> {
-        let spec = &self.plant.spec;
+        let spec = self.spec();
         let parameters = spec.parameters();
         let of_parameters = self.free.iter().map(|&i| {
             let v = spec.variable(parameters[i]);
@@ -312,7 +336,12 @@ impl<'a> Problem<'a> {
         let (nominal, ranges) = (self.nominal(), self.ranges());
         let may_vanish =
             |&i: &usize| nominal[i] != 0.0 && ranges[i].min <= 0.0 && 0.0 <= ranges[i].max;
-        let terms = (0..self.free.len()).filter(may_vanish);
+        let count = if self.plant.costly() {
+            0
+        } else {
+            self.free.len()
+        };
+        let terms = (0..count).filter(may_vanish);
         terms
             .map(|i| {
                 let mut point = nominal.clone();
@@ -388,7 +417,7 @@ impl<'a> Problem<'a> {
 impl Problem<'_> {
     /// Names of the free parameters.
     pub fn names(&self) -> Vec<String> {
-        let spec = &self.plant.spec;
+        let spec = self.spec();
         let parameters: Vec<_> = spec.of_kind(VariableKind::Parameter).collect();
         self.free
             .iter()

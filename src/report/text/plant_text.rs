@@ -222,19 +222,23 @@ fn equilibrium(plant: &Plant) -> String {
 
 /// What was estimated.
 pub fn plant_estimate_text(document: &PlantDocument, title: &str, style: Style) -> String {
-    let mut out = wrapped("", &verdict(document, title));
+    let external = document.simulator.as_ref();
+    let said = verdict(document, title);
+    let (said, in_text, of_text) = match external {
+        None => (said, "in the text", "values of the text"),
+        // The same is said of a simulator, which is no text of equations.
+        Some(_) => (
+            said.replace("the equations leave", "the simulator leaves"),
+            "given",
+            "values given",
+        ),
+    };
+    let mut out = wrapped("", &said);
     if !document.parameters.is_empty() {
         out += "\nParameters\n";
-        let mut table = Table::new([
-            "name",
-            "estimate",
-            "unit",
-            "95 % interval",
-            "in the text",
-            "",
-        ])
-        .flush_left(2)
-        .flush_left(5);
+        let mut table = Table::new(["name", "estimate", "unit", "95 % interval", in_text, ""])
+            .flush_left(2)
+            .flush_left(5);
         for p in &document.parameters {
             let end = |e: Option<f64>| e.map_or("open".to_owned(), |e| significant(e, 6));
             let [low, high] = p.interval_95.unwrap_or([None, None]);
@@ -270,7 +274,7 @@ pub fn plant_estimate_text(document: &PlantDocument, title: &str, style: Style) 
         "estimated",
         "rms error",
         "held out",
-        "values of the text",
+        of_text,
         "best linear model",
         "its order",
     ]);
@@ -304,6 +308,9 @@ pub fn plant_estimate_text(document: &PlantDocument, title: &str, style: Style) 
         ]);
     }
     out += &table.lines();
+    if let Some(simulator) = external {
+        out += &format!("\n{}", wrapped("", &simulator.said()));
+    }
     out
 }
 
