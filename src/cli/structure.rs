@@ -10,10 +10,10 @@ use super::roles::RoleFlags;
 use super::terminal::style;
 use super::{Outcome, Verbosity};
 use crate::log::{Log, RoleNeed, Source, check_same_sampling};
-use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
+use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate, evaluate};
 use crate::physics::{Hold, Plant};
 use crate::report::text::plant_estimate_text;
-use crate::report::{PlantDocument, plant_fits};
+use crate::report::{PlantDocument, plant_fits, plant_page};
 
 /// A plant in equations.
 #[derive(Debug, Clone, Args)]
@@ -87,7 +87,7 @@ pub(super) fn run(
     flags: &StructureFlags,
     logs: &[Source],
     roles: &RoleFlags,
-    output: Option<&PathBuf>,
+    (output, report): (Option<&PathBuf>, Option<&PathBuf>),
     say: Verbosity,
 ) -> anyhow::Result<Outcome> {
     let Some(structure) = &flags.structure else {
@@ -96,7 +96,11 @@ pub(super) fn run(
     check_distinct(logs)?;
     let mut read = paths(logs);
     read.push(structure);
-    let output = output.map(|o| Output::check(o, &read)).transpose()?;
+    let (output, report) = Output::check_both(
+        output.map(PathBuf::as_path),
+        report.map(PathBuf::as_path),
+        &read,
+    )?;
     let loaded = load(structure)?;
     let plant = &loaded.plant;
     let hold = flags.hold.map_or(loaded.hold, Hold::from);
@@ -128,16 +132,32 @@ pub(super) fn run(
     if let Some(output) = &output {
         output.write(&document.to_json()?)?;
     }
-    if say.quiet || output.as_ref().is_some_and(Output::is_stdout) {
+    if let Some(report) = &report {
+        report.write(&page(plant, &document, &records)?)?;
+    }
+    let files = || [&output, &report].into_iter().flatten();
+    if say.quiet || files().any(Output::is_stdout) {
         return Ok(Outcome::Done);
     }
     let samples: usize = logs.iter().map(Log::samples).sum();
     let title = format!("{} from {samples} samples", plant.spec.name);
     print(&plant_estimate_text(&document, &title, style()))?;
-    if let Some(output) = &output {
-        print(&format!("\nwritten to {}\n", output.path().display()))?;
+    for (index, output) in files().enumerate() {
+        let gap = if index == 0 { "\n" } else { "" };
+        print(&format!("{gap}written to {}\n", output.path().display()))?;
     }
     Ok(Outcome::Done)
+}
+
+/// The page of an estimated plant.
+fn page(
+    plant: &Plant,
+    document: &PlantDocument,
+    records: &[PlantRecording],
+) -> anyhow::Result<String> {
+    let (_, point) = document.plant().map_err(anyhow::Error::msg)?;
+    let found = evaluate(plant, records, &document.held_with_starts(plant, &point))?;
+    Ok(plant_page(plant, document, records, &found)?)
 }
 
 /// Which parameters are free.

@@ -8,6 +8,7 @@ mod error;
 pub mod estimate;
 mod expression;
 mod modelica;
+mod operating_point;
 mod simulation;
 mod sort;
 mod spec;
@@ -16,6 +17,7 @@ mod units;
 
 pub use error::{SpecError, SpecErrorKind};
 pub use expression::{Binary, ExpressionId, Expressions, Function, Node, Span, VariableId};
+pub use operating_point::{Linearisation, OperatingPlant, OperatingPoint, OperatingPointError};
 pub use simulation::{
     Direction, Excitation, Hold, LinearPlant, Observer, Plan, Plant, Point, SimulationError,
     Trajectory,

@@ -1,6 +1,7 @@
 //! A plant in equations, for people: what was read, and what was estimated.
 
 use super::number::{percent, significant, with_std};
+use super::plant_validation_text::{initial_state_text, residual_test_table};
 use super::table::Table;
 use super::{Style, wrapped};
 use crate::physics::{ModelSpec, Plant, Unknown, VariableKind};
@@ -161,46 +162,48 @@ pub fn plant_estimate_text(document: &PlantDocument, title: &str, style: Style) 
     let mut out = wrapped("", &verdict(document, title));
     if !document.parameters.is_empty() {
         out += "\nParameters\n";
-        let mut table = Table::new([
-            "name",
-            "estimate",
-            "unit",
-            "95 % interval",
-            "in the text",
-            "",
-        ])
-        .flush_left(2)
-        .flush_left(5);
-        for p in &document.parameters {
-            let end = |e: Option<f64>| e.map_or("open".to_owned(), |e| significant(e, 6));
-            let [low, high] = p.interval_95.unwrap_or([None, None]);
-            table.row([
-                p.name.clone(),
-                with_std(Some(p.value), p.std, style),
-                p.unit.clone().unwrap_or_default(),
-                format!("{} to {}", end(low), end(high)),
-                p.text_value.map_or(String::new(), |v| significant(v, 6)),
-                if p.at_bound { "at its bound" } else { "" }.to_owned(),
-            ]);
-        }
-        out += &table.lines();
+        out += &parameter_table(document, style).lines();
     }
     for message in &document.undetermined {
         out += &wrapped("  ! ", message);
     }
-    if let Some(first) = document.initial_states.first().filter(|s| !s.is_empty()) {
-        out += if document.initial_states.len() > 1 {
-            "\nInitial states of the first recording\n"
-        } else {
-            "\nInitial states\n"
-        };
-        let mut table = Table::new(["state", "value"]);
-        for s in first {
-            table.row([s.name.clone(), with_std(Some(s.value), s.std, style)]);
-        }
-        out += &table.lines();
-    }
+    out += &initial_state_text(&document.initial_states, style);
     out += "\nFit in free run\n";
+    out += &plant_fit_table(document).lines();
+    out += "\nResiduals\n";
+    out += &residual_test_table(&document.residual_tests).lines();
+    out
+}
+
+/// The estimated parameters.
+pub(crate) fn parameter_table(document: &PlantDocument, style: Style) -> Table {
+    let mut table = Table::new([
+        "name",
+        "estimate",
+        "unit",
+        "95 % interval",
+        "in the text",
+        "",
+    ])
+    .flush_left(2)
+    .flush_left(5);
+    for p in &document.parameters {
+        let end = |e: Option<f64>| e.map_or("open".to_owned(), |e| significant(e, 6));
+        let [low, high] = p.interval_95.unwrap_or([None, None]);
+        table.row([
+            p.name.clone(),
+            with_std(Some(p.value), p.std, style),
+            p.unit.clone().unwrap_or_default(),
+            format!("{} to {}", end(low), end(high)),
+            p.text_value.map_or(String::new(), |v| significant(v, 6)),
+            if p.at_bound { "at its bound" } else { "" }.to_owned(),
+        ]);
+    }
+    table
+}
+
+/// Fits in free run.
+pub(crate) fn plant_fit_table(document: &PlantDocument) -> Table {
     let mut table = Table::new([
         "output",
         "estimated",
@@ -220,29 +223,11 @@ pub fn plant_estimate_text(document: &PlantDocument, title: &str, style: Style) 
                 .map_or(String::new(), |n| n.to_string()),
         ]);
     }
-    out += &table.lines();
-    out += "\nResiduals\n";
-    let mut table = Table::new(["output", "question", "chi-square", "degrees", "p"]).flush_left(1);
-    for t in &document.residual_tests {
-        let question = match t.question.as_str() {
-            "white" => "white?",
-            "inputs" => "independent of past inputs?",
-            _ => "independent of products of inputs and outputs?",
-        };
-        table.row([
-            t.output.clone(),
-            question.to_owned(),
-            significant(t.statistic, 4),
-            t.degrees.to_string(),
-            significant(t.p_value, 2),
-        ]);
-    }
-    out += &table.lines();
-    out
+    table
 }
 
 /// The headline.
-fn verdict(document: &PlantDocument, title: &str) -> String {
+pub(crate) fn verdict(document: &PlantDocument, title: &str) -> String {
     let failed: Vec<&str> = document
         .residual_tests
         .iter()
