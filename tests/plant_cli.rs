@@ -422,6 +422,15 @@ fn what_does_not_fit_is_said() {
         let error = folder.run(arguments).error();
         assert!(error.contains(words), "{arguments:?}: {error}");
     }
+    folder.text(
+        "gain.mo",
+        "model G parameter Real k = 3; input Real u; output Real y; equation y = k*u; end G;",
+    );
+    let json = folder.run(&["show", "gain.mo", "--format", "json"]).json();
+    assert_eq!(
+        (&json["static_gain"][0]["value"], &json["poles"]),
+        (&3.0.into(), &serde_json::json!([]))
+    );
     // Not asked for: the rest is shown.
     let shown = folder.run(&["show", "tank.mo"]);
     assert!(

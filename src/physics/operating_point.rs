@@ -111,16 +111,22 @@ impl Plant {
         operating: &OperatingPoint,
         uncertain: &[usize],
     ) -> Result<OperatingPlant, OperatingPointError> {
-        let state =
-            match operating {
-                OperatingPoint::Equilibrium(near) => self
-                    .equilibrium(point, near, inputs)
-                    .ok_or_else(|| OperatingPointError::NoEquilibrium {
-                        near: self.named_states(near),
-                    })?,
-                OperatingPoint::Start => self.start(point),
-                OperatingPoint::State(state) => state.clone(),
-            };
+        let state = match operating {
+            OperatingPoint::Equilibrium(near) if near.is_empty() => Vec::new(),
+            OperatingPoint::Equilibrium(near) => {
+                let found = self.equilibrium(point, near, inputs);
+                let mut state = found.ok_or_else(|| OperatingPointError::NoEquilibrium {
+                    near: self.named_states(near),
+                })?;
+                // Newton's method ends this far from zero.
+                let rounding = ROUNDING * state.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
+                let small = state.iter_mut().filter(|x| x.abs() <= rounding);
+                small.for_each(|x| *x = 0.0);
+                state
+            }
+            OperatingPoint::Start => self.start(point),
+            OperatingPoint::State(state) => state.clone(),
+        };
         let linearised = |point: &Point, state: Vec<f64>| {
             let linear = self.linearise(point, &state, inputs, 0.0);
             self.check_finite(&linear, &state)?;
@@ -155,6 +161,7 @@ impl Plant {
                 continue;
             }
             let slope = match operating {
+                _ if at.state.is_empty() => DVector::zeros(0),
                 OperatingPoint::State(_) => DVector::zeros(at.state.len()),
                 OperatingPoint::Start => {
                     let [below, above] =

@@ -23,6 +23,8 @@ pub const LINEARISATION_FORMAT: &str = "innovant-linearisation/1";
 const FREQUENCIES: usize = 60;
 /// How far the grid reaches below the slowest and above the fastest pole.
 const REACH: f64 = 10.0;
+/// Standard deviations of states below this are the rounding of an equilibrium.
+const ROUNDING: f64 = 1e-15;
 /// A pole below this part of the size of `A` is an integrator: rounding moves it by about as much.
 const INTEGRATOR: f64 = 1e-9;
 
@@ -142,7 +144,6 @@ impl LinearisationDocument {
             }
         };
         let spread = of.stds(|l| l.state.clone());
-        const ROUNDING: f64 = 1e-15;
         Ok(Self {
             format: LINEARISATION_FORMAT.to_owned(),
             operating_point,

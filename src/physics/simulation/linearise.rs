@@ -30,6 +30,9 @@ impl LinearPlant {
     pub fn response(&self, s: Complex64) -> DMatrix<Complex64> {
         let complex = |m: &DMatrix<f64>| m.map(|v| Complex64::new(v, 0.0));
         let n = self.a.nrows();
+        if n == 0 {
+            return complex(&self.d);
+        }
         let resolvent = DMatrix::from_diagonal_element(n, n, s) - complex(&self.a);
         match resolvent.lu().solve(&complex(&self.b)) {
             Some(states) => complex(&self.c) * states + complex(&self.d),

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::head::{Column, Head, Row, Table, sections};
+use super::head::{Column, Head, Row, Table, capitalised, sections};
 use super::number::{exact, fixed, with_unit};
 use super::pictures;
 use super::plot::Group;
@@ -103,7 +103,7 @@ pub(super) fn view(
             version: env!("CARGO_PKG_VERSION").to_owned(),
         },
         kind,
-        headline: sentence_case(headline),
+        headline: capitalised(headline),
         about: match about {
             "" => String::new(),
             about => format!("{about}."),
@@ -117,7 +117,7 @@ pub(super) fn view(
         undetermined: document
             .undetermined
             .iter()
-            .map(|m| sentence_case(m))
+            .map(|m| capitalised(m))
             .collect(),
         correlations: correlations(document),
         initial_states: document.initial_states.first().and_then(|s| {
@@ -160,15 +160,6 @@ pub(super) fn view(
             ),
             ("Written by", format!("innovant {}", document.version)),
         ],
-    }
-}
-
-/// The first letter large, unless the sentence begins with a name, which nobody knows: only what is lower-case as a word.
-fn sentence_case(text: &str) -> String {
-    let mut letters = text.chars();
-    match letters.next() {
-        Some(first) => first.to_uppercase().chain(letters).collect(),
-        None => String::new(),
     }
 }
 
