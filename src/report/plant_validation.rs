@@ -168,7 +168,11 @@ pub fn judge_plant(
         );
     } else if fails("white") {
         findings.push(
-            "the residuals are not white: the noise differs from that of the plant".to_owned(),
+            match held.noise {
+                Some(_) => "the residuals are not white: the noise differs from that of the plant",
+                None => "the residuals are not white: there is slow noise, or the equations or their values leave something out",
+            }
+            .to_owned(),
         );
     }
     if free_run.is_none() {

@@ -48,7 +48,7 @@ pub struct Held<'a> {
     pub hold: Hold,
     /// Gain of the observer, for the innovation form.
     pub gain: Option<&'a DMatrix<f64>>,
-    /// The noise; none estimates it.
+    /// The noise; without it the plant states that there is none but white noise.
     pub noise: Option<HeldNoise>,
     /// Whether the plant was estimated from these recordings.
     pub own: bool,
@@ -102,14 +102,19 @@ pub fn evaluate(
         return Err(problem.why_not());
     };
     let noise = objective.noise.clone();
-    let innovations = noise.whiten(&residual, &problem.mask);
     let l = problem.outputs();
+    // Of a plant without a noise model all of the residual is unexplained; a colour only keeps the other tests sound.
+    let stated = match estimated {
+        true => Noise::white(&residual, l, &problem.mask),
+        false => noise.clone(),
+    };
+    let innovations = stated.whiten(&residual, &problem.mask);
     let recorded = recordings.iter().flat_map(|r| &r.outputs);
     let predicted = recorded
         .zip(&innovations)
         .enumerate()
         .map(|(s, (y, e))| {
-            let scale = noise.scale[s % l];
+            let scale = stated.scale[s % l];
             y.iter().zip(e).map(|(y, e)| y - scale * e).collect()
         })
         .collect();
@@ -120,9 +125,9 @@ pub fn evaluate(
         Some(simulated) => simulated,
         None => &predicted,
     };
-    let fitted = held.own || estimated;
     let left = Left::new(&problem, held, &noise, &residual, jacobian);
-    let tests = left.tests(&problem, &noise, signals, fitted);
+    let raw = estimated.then_some(innovations.as_slice());
+    let tests = left.tests(&problem, &noise, signals, (raw, held.own));
     let mut points = problem.points(&point);
     points
         .iter_mut()
@@ -305,15 +310,18 @@ impl Left {
         problem: &Problem,
         noise: &Noise,
         signals: &[Vec<f64>],
-        fitted: bool,
+        (raw, fitted): (Option<&[Vec<f64>]>, bool),
     ) -> Vec<ResidualTest> {
         let l = problem.outputs();
         let mut tests = Vec::new();
         for output in 0..l {
-            let series: Vec<&[f64]> = (output..self.first.len() - 1)
-                .step_by(l)
-                .map(|s| &self.residual.as_slice()[self.first[s]..self.first[s + 1]])
-                .collect();
+            let places = (output..self.first.len() - 1).step_by(l);
+            let series: Vec<&[f64]> = match raw {
+                Some(raw) => places.map(|s| raw[s].as_slice()).collect(),
+                None => places
+                    .map(|s| &self.residual.as_slice()[self.first[s]..self.first[s + 1]])
+                    .collect(),
+            };
             let fitted = if fitted {
                 noise.colours[output].len()
             } else {

@@ -203,7 +203,7 @@ pub(crate) fn parameter_table(document: &PlantDocument, style: Style) -> Table {
 }
 
 /// Fits in free run.
-pub(crate) fn plant_fit_table(document: &PlantDocument) -> Table {
+fn plant_fit_table(document: &PlantDocument) -> Table {
     let mut table = Table::new([
         "output",
         "estimated",

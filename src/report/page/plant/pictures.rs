@@ -14,6 +14,9 @@ const LAGS: usize = 25;
 /// Level of the bounds of an autocorrelation.
 const BOUND: f64 = 0.99;
 
+/// Name, style and points.
+type Line<'a> = (&'a str, &'static str, Vec<(f64, f64)>);
+
 /// A recording as a picture needs it.
 struct Drawn<'a> {
     plant: &'a Plant,
@@ -38,7 +41,7 @@ impl Drawn<'_> {
         lines: &[(&str, &'static str, &[f64])],
     ) -> Plot {
         let v = self.plant.spec.variable(of);
-        let lines: Vec<(&str, &'static str, Vec<(f64, f64)>)> = lines
+        let lines: Vec<Line> = lines
             .iter()
             .map(|(name, style, values)| (*name, *style, self.points(values)))
             .collect();

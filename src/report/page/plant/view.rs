@@ -10,9 +10,10 @@ use super::source::Source;
 use crate::physics::Plant;
 use crate::physics::estimate::{Evaluation, PlantRecording};
 use crate::report::PlantDocument;
+use crate::report::text;
 use crate::report::text::{
-    Style, initial_state_table, parameter_table, plant_fit_table, plant_verdict,
-    residual_test_table, tests_fail,
+    Style, initial_state_table, parameter_table, percent, plant_verdict, residual_test_table,
+    tests_fail,
 };
 
 /// Correlations from this size on mean that hardly more than a combination of the two is known.
@@ -109,7 +110,7 @@ pub(super) fn view(
             about => format!("{about}."),
         },
         remarks,
-        fit: Table::of(&plant_fit_table(document), ""),
+        fit: fit(document),
         parameters: Table::of(
             &parameter_table(document, style),
             "Estimate ± one standard deviation; 95 % interval from the profile of the likelihood",
@@ -163,11 +164,26 @@ pub(super) fn view(
     }
 }
 
+/// Fits in free run, narrow enough for the first screen.
+fn fit(document: &PlantDocument) -> Option<Table> {
+    let mut table = text::Table::new(["output", "estimated", "text", "linear model"]);
+    for f in &document.fit {
+        let share = |value: Option<f64>| value.map_or(String::new(), percent);
+        table.row([
+            f.output.clone(),
+            percent(f.free_run_percent),
+            share(f.text_percent),
+            share(f.linear_model_percent),
+        ]);
+    }
+    Table::of(&table, "")
+}
+
 /// Correlations of the estimates; rows with a strong one are marked.
 fn correlations(document: &PlantDocument) -> Option<Table> {
     let covariance = &document.covariance.as_ref()?.0;
     let count = document.parameters.len();
-    if count < 2 || count > MOST_CORRELATED || covariance.shape() != (count, count) {
+    if !(2..=MOST_CORRELATED).contains(&count) || covariance.shape() != (count, count) {
         return None;
     }
     let column = |name: &str| Column {
