@@ -1,13 +1,19 @@
 //! Plants in equations.
 
-use innovant::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
-use innovant::physics::{Excitation, Hold, Plant as Core, Point, VariableId, check_units, parse};
+use innovant::log::Log;
+use innovant::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate, evaluate};
+use innovant::physics::{
+    Excitation, Hold, OperatingPoint, Plant as Core, Point, VariableId, check_units, parse,
+};
 use innovant::report::text::{Style, plant_estimate_text, plant_text};
-use innovant::report::{PlantDocument, plant_fits};
+use innovant::report::{
+    LinearisationDocument, PlantDocument, Uncertain, frequency_grid, plant_fits, plant_page,
+    to_json,
+};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::arrays::{Samples, columns, matrix, recording, recording_name, samples, slices};
+use crate::arrays::{Samples, columns, matrix, recordings, samples, slices};
 use crate::errors::raise;
 
 /// A plant in equations.
@@ -15,6 +21,19 @@ use crate::errors::raise;
 pub struct Plant {
     core: Core,
     point: Point,
+    /// What was estimated.
+    document: Option<PlantDocument>,
+}
+
+/// Logs as recordings of a plant.
+fn records(logs: &[Log]) -> Vec<PlantRecording> {
+    let record = |log: &Log| PlantRecording {
+        inputs: log.input_data.clone(),
+        outputs: log.output_data.clone(),
+        sample_time: log.sample_time,
+        start_time: log.start_time,
+    };
+    logs.iter().map(record).collect()
 }
 
 fn hold(name: &str) -> PyResult<Hold> {
@@ -30,6 +49,17 @@ impl Plant {
         of.into_iter()
             .map(|v| self.core.spec.variable(v).column().to_owned())
             .collect()
+    }
+
+    fn check_inputs(&self, inputs: &[f64]) -> PyResult<()> {
+        let expected = self.inputs().len();
+        if inputs.len() == expected {
+            return Ok(());
+        }
+        let given = inputs.len();
+        Err(raise(format!(
+            "{given} inputs were given; the plant has {expected}"
+        )))
     }
 
     /// The point with parameters and initial states by name.
@@ -62,7 +92,11 @@ impl Plant {
         if text.trim_start().starts_with('{') {
             let document = PlantDocument::parse(name, text).map_err(raise)?;
             let (core, point) = document.plant().map_err(raise)?;
-            return Ok(Self { core, point });
+            return Ok(Self {
+                core,
+                point,
+                document: Some(document),
+            });
         }
         let spec = parse(text).map_err(|e| raise(e.render(name, text)))?;
         check_units(&spec).map_err(|e| raise(e.render(name, text)))?;
@@ -70,6 +104,7 @@ impl Plant {
         Ok(Self {
             point: core.nominal(),
             core,
+            document: None,
         })
     }
 
@@ -160,26 +195,8 @@ impl Plant {
             },
             least_squares,
         };
-        let (inputs, outputs) = (self.inputs(), self.outputs());
-        let mut logs = Vec::new();
-        for (i, (u, y)) in u.iter().zip(&y).enumerate() {
-            let (u, y) = (columns(u), columns(y));
-            logs.push(recording(
-                &recording_name(i, logs.len() + 1),
-                dt,
-                (&inputs, &outputs),
-                (u, y),
-            )?);
-        }
-        let records: Vec<PlantRecording> = logs
-            .iter()
-            .map(|log| PlantRecording {
-                inputs: log.input_data.clone(),
-                outputs: log.output_data.clone(),
-                sample_time: log.sample_time,
-                start_time: log.start_time,
-            })
-            .collect();
+        let logs = recordings(&u, &y, dt, &self.inputs(), &self.outputs())?;
+        let records = self::records(&logs);
         let start = self.core.with_values(&self.point.parameters);
         py.detach(|| {
             let found = estimate(&start, &records, &options).map_err(raise)?;
@@ -206,13 +223,7 @@ impl Plant {
         Bound<'py, PyArray2<f64>>,
         Bound<'py, PyArray2<f64>>,
     )> {
-        if inputs.len() != self.inputs().len() {
-            return Err(raise(format!(
-                "{} inputs were given; the plant has {}",
-                inputs.len(),
-                self.inputs().len()
-            )));
-        }
+        self.check_inputs(&inputs)?;
         let point = self.at(&[], &state)?;
         let linear = self
             .core
@@ -223,5 +234,69 @@ impl Plant {
             matrix(py, &linear.c),
             matrix(py, &linear.d),
         ))
+    }
+
+    /// The plant linearised at a state (none: the equilibrium), as the document `innovant-linearisation/1`.
+    fn linearisation(
+        &self,
+        state: Option<Vec<(String, f64)>>,
+        inputs: Vec<f64>,
+        frequencies: Vec<f64>,
+    ) -> PyResult<String> {
+        self.check_inputs(&inputs)?;
+        let (operating, words) = match &state {
+            None => (
+                OperatingPoint::Equilibrium(self.core.start(&self.point)),
+                "the equilibrium",
+            ),
+            Some(state) => {
+                let point = self.at(&[], state)?;
+                let state = self.core.start(&point);
+                (OperatingPoint::State(state), "the given state")
+            }
+        };
+        let document = self.document.as_ref();
+        let uncertainty = document.and_then(|d| d.uncertainty(&self.core));
+        let uncertain = uncertainty.as_ref().map_or(&[][..], |(places, _)| places);
+        let at = self
+            .core
+            .at_operating_point(&self.point, &inputs, &operating, uncertain)
+            .map_err(raise)?;
+        let of = Uncertain {
+            plant: &self.core,
+            operating: &at,
+            covariance: uncertainty.as_ref().map(|(_, covariance)| *covariance),
+        };
+        let frequencies = match frequencies.is_empty() {
+            true => frequency_grid(&at, document.and_then(|d| d.sample_time)).map_err(raise)?,
+            false => frequencies,
+        };
+        let found = LinearisationDocument::new(&of, words.to_owned(), &frequencies);
+        to_json(&found.map_err(raise)?).map_err(raise)
+    }
+
+    /// The equations with the values of the parameters.
+    fn modelica(&self) -> String {
+        self.core.text_at(&self.point)
+    }
+
+    /// The page of an estimated plant, on the recordings that it was estimated from.
+    fn page(
+        &self,
+        py: Python<'_>,
+        u: Vec<Samples<'_>>,
+        y: Vec<Samples<'_>>,
+        dt: f64,
+    ) -> PyResult<String> {
+        let Some(document) = &self.document else {
+            return Err(raise("a plant that was not estimated has no page"));
+        };
+        let logs = recordings(&u, &y, dt, &self.inputs(), &self.outputs())?;
+        py.detach(|| {
+            let records = records(&logs);
+            let held = document.held_with_starts(&self.core, &self.point);
+            let found = evaluate(&self.core, &records, &held).map_err(raise)?;
+            plant_page(&self.core, document, &records, &found).map_err(raise)
+        })
     }
 }

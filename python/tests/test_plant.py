@@ -57,6 +57,30 @@ def test_linearised_at_rest():
     np.testing.assert_allclose(d, [[0]])
 
 
+def test_an_estimate_is_linearised_with_its_uncertainty(tmp_path):
+    plant = innovant.Plant(TEXT)
+    assert plant.to_modelica() == TEXT
+    assert plant.linearisation()["poles"][0]["natural_frequency_std"] is None
+    fitted = plant.fit(*recording(plant), dt=0.03)
+    pole = fitted.linearisation(inputs=[0.5], frequencies=[1.0, 3.0])["poles"][0]
+    # Held up by a torque: sin(phi) = u/(m g l), w^2 = g cos(phi)/l.
+    height = 0.5 / (0.5 * 9.80665 * 0.4)
+    truth = np.sqrt(9.80665 / 0.4 * np.sqrt(1 - height**2)) / (2 * np.pi)
+    assert abs(pole["natural_frequency_hz"] - truth) < 4 * pole["natural_frequency_std"]
+    again = innovant.Plant(fitted.to_modelica())
+    assert again.parameters == fitted.parameters
+    fitted.report(tmp_path / "page.html")
+    assert '<section id="parameters"' in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+def test_linearised_for_python_control():
+    control = pytest.importorskip("control")
+    system = innovant.Plant(TEXT).to_control()
+    assert isinstance(system, control.StateSpace) and system.isctime()
+    assert (system.input_labels, system.output_labels, system.state_labels) == (["u"], ["y"], ["phi", "w"])
+    np.testing.assert_allclose(system.dcgain(), 1 / (0.45 * 9.80665 * 0.4))
+
+
 def test_two_recordings_are_better_than_one():
     plant = innovant.Plant(TEXT)
     (u1, y1), (u2, y2) = recording(plant), recording(plant, seed=2)

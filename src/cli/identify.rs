@@ -52,7 +52,8 @@ pub(super) struct Flags {
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Write a page to this file, as HTML: verdict, order, frequency response, poles, step response, residuals and the
-    /// recording, with pictures; `-` is standard output
+    /// recording, with pictures (of a plant: parameters, recorded and simulated outputs, residuals, equations); `-` is
+    /// standard output
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
 }
@@ -100,14 +101,11 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         );
     }
     if flags.plant.asked() {
-        if flags.report.is_some() {
-            anyhow::bail!("--report draws linear models; leave it out with --structure");
-        }
         return structure::run(
             &flags.plant,
             &flags.logs,
             &flags.roles,
-            flags.output.as_ref(),
+            (flags.output.as_ref(), flags.report.as_ref()),
             say,
         );
     }

@@ -21,6 +21,7 @@ mod resources;
 mod roles;
 mod schema;
 mod show;
+mod show_plant;
 mod simulate;
 mod simulate_plant;
 mod simulator;
@@ -139,7 +140,7 @@ fn dispatch(cli: Cli) -> anyhow::Result<Outcome> {
         Some(Command::Validate(flags)) => validate::run(flags, say),
         Some(Command::Simulate(flags)) => simulate::run(flags, say),
         Some(Command::Check(flags)) => check::run(&flags, say),
-        Some(Command::Show(flags)) => show::run(flags),
+        Some(Command::Show(flags)) => show::run(flags, say),
         Some(Command::Reproduce(flags)) => reproduce::run(flags, say),
         Some(Command::Schema(flags)) => schema::run(&flags),
         Some(Command::Completions(flags)) => completions::run(&flags),

@@ -25,6 +25,13 @@ pub(super) struct LoadedPlant {
     pub warnings: Vec<String>,
 }
 
+impl LoadedPlant {
+    /// The equations with the values of the parameters.
+    pub fn modelica(&self) -> String {
+        self.plant.text_at(&self.point)
+    }
+}
+
 /// Whether a file holds a plant: a text by its name, or a document by what it says.
 pub(super) fn is_plant_file(path: &Path) -> bool {
     is_text(path) || std::fs::read_to_string(path).is_ok_and(|text| is_plant(&text))
@@ -233,22 +240,33 @@ pub(super) fn set_start(
     point: &mut Point,
     values: &[(String, f64)],
 ) -> anyhow::Result<()> {
-    let states = plant.spec.states();
     for (name, value) in values {
-        let at = states
-            .iter()
-            .position(|&v| plant.spec.variable(v).name == *name)
-            .with_context(|| {
-                let known: Vec<&str> = states
-                    .iter()
-                    .map(|&v| plant.spec.variable(v).name.as_str())
-                    .collect();
-                format!(
-                    "--initial-state: the plant has no state `{name}`; it has {}",
-                    known.join(", ")
-                )
-            })?;
+        let at = place(
+            plant,
+            plant.spec.states(),
+            ("--initial-state", "state"),
+            name,
+        )?;
         point.start[at] = Some(*value);
     }
     Ok(())
+}
+
+/// Place of the variable called `name` among variables of one kind; the message names the flag.
+pub(super) fn place(
+    plant: &Plant,
+    variables: Vec<VariableId>,
+    (flag, kind): (&str, &str),
+    name: &str,
+) -> anyhow::Result<usize> {
+    let names: Vec<&str> = variables
+        .iter()
+        .map(|&v| plant.spec.variable(v).name.as_str())
+        .collect();
+    names.iter().position(|n| *n == name).with_context(|| {
+        format!(
+            "{flag}: the plant has no {kind} `{name}`; it has {}",
+            names.join(", ")
+        )
+    })
 }

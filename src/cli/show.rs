@@ -4,11 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::Outcome;
 use super::numbers;
 use super::output::print;
+use super::plant::is_plant_file;
+use super::show_plant::{self, PlantShowFlags};
 use super::terminal::style;
-use crate::covariance::{Invariants, ResponsePoint, invariants};
+use super::{Outcome, Verbosity};
+use crate::covariance::{ResponsePoint, invariants};
 use crate::identify::Model;
 use crate::report::text::show_text;
 use crate::report::{names, read_model, to_json};
@@ -19,16 +21,24 @@ const FREQUENCIES: usize = 60;
 const EXAMPLE: &str = "Examples:
   innovant show model.json
   innovant show model.json --format json --at 0.1,0.3 | jq '.frequency_response[0].magnitude_95'
-  innovant show model.json --format csv > frequency_response.csv";
+  innovant show model.json --format csv > frequency_response.csv
+  innovant show plant.json --input 'u=0.5'            poles at the equilibrium with this input
+  innovant show plant.json --along log.csv            beside what `identify` finds in the same recording
+  innovant show plant.json --format modelica > calibrated.mo";
 
 /// Show what is known of a model: poles, zeros, gains, frequency response with bands
+///
+/// A plant in equations is shown with its parameters, and linearised at an operating point; uncertainty is carried over
+/// from the parameters.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(super) struct Flags {
-    /// Model, as `innovant identify --output` writes it, or {"A":..,"B":..,"C":..,"dt":..}; `-` is standard input
+    /// Model, as `innovant identify --output` writes it, or {"A":..,"B":..,"C":..,"dt":..}, or a plant in equations (.mo);
+    /// `-` is standard input
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// text: tables; json: everything; csv: the frequency response
+    /// text: tables; json: everything (of a plant in equations: its linearisation); csv: the frequency response; modelica:
+    /// the equations with the estimated values
     #[arg(long, value_enum, default_value = "text")]
     format: Format,
     /// Frequencies in rad/s [default: a logarithmic grid up to Nyquist]
@@ -40,16 +50,28 @@ pub(super) struct Flags {
         allow_negative_numbers = true
     )]
     at: Vec<f64>,
+    #[command(flatten)]
+    plant: PlantShowFlags,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Format {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Format {
     Text,
     Json,
     Csv,
+    Modelica,
 }
 
-pub(super) fn run(flags: Flags) -> anyhow::Result<Outcome> {
+pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
+    if is_plant_file(&flags.model) {
+        return show_plant::run(&flags.model, &flags.plant, &flags.at, flags.format, say);
+    }
+    let name = flags.model.display();
+    if flags.plant.given() || flags.format == Format::Modelica {
+        anyhow::bail!(
+            "{name}: --state, --input, --along and --format modelica belong to a plant in equations, and this is none"
+        );
+    }
     let read = read_model(&flags.model)?;
     let model = &read.model;
     let frequencies = frequencies(&flags.at, model)?;
@@ -70,7 +92,14 @@ pub(super) fn run(flags: Flags) -> anyhow::Result<Outcome> {
             style(),
         ))?,
         Format::Json => print(&to_json(&described)?)?,
-        Format::Csv => print(&table(&described)?)?,
+        // Refused above.
+        Format::Modelica => {}
+        Format::Csv => print(&table(
+            described
+                .frequency_response
+                .iter()
+                .chain(&described.noise_response),
+        )?)?,
     }
     Ok(Outcome::Done)
 }
@@ -89,8 +118,8 @@ fn frequencies(asked: &[f64], model: &Model) -> anyhow::Result<Vec<f64>> {
     Ok(asked.to_vec())
 }
 
-/// Both frequency responses as CSV; the innovation of output y is the input `e(y)`.
-fn table(described: &Invariants) -> anyhow::Result<String> {
+/// Frequency responses as CSV; the innovation of output y is the input `e(y)`.
+pub(super) fn table<'a>(points: impl Iterator<Item = &'a ResponsePoint>) -> anyhow::Result<String> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     csv.write_record([
         "rad_s",
@@ -111,10 +140,6 @@ fn table(described: &Invariants) -> anyhow::Result<String> {
         "phase_95_low",
         "phase_95_high",
     ])?;
-    let points = described
-        .frequency_response
-        .iter()
-        .chain(&described.noise_response);
     for point in points {
         csv.write_record(record(point))?;
     }

@@ -149,6 +149,7 @@ pub(super) fn run(
         &document,
         &format!("Simulator from {samples} samples"),
         output.as_ref(),
+        None,
         say,
     )?;
     if let Some(error) = count.first_failure.filter(|_| !say.quiet) {

@@ -10,10 +10,10 @@ use super::roles::RoleFlags;
 use super::terminal::style;
 use super::{Outcome, Verbosity};
 use crate::log::{Log, RoleNeed, Source, check_same_sampling};
-use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
-use crate::physics::{Hold, ModelSpec, Simulated};
+use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate, evaluate};
+use crate::physics::{Hold, ModelSpec, Plant, Simulated};
 use crate::report::text::plant_estimate_text;
-use crate::report::{PlantDocument, plant_fits};
+use crate::report::{PlantDocument, plant_fits, plant_page};
 
 /// A plant in equations.
 #[derive(Debug, Clone, Args)]
@@ -92,7 +92,7 @@ pub(super) fn run(
     flags: &StructureFlags,
     logs: &[Source],
     roles: &RoleFlags,
-    output: Option<&PathBuf>,
+    (output, report): (Option<&PathBuf>, Option<&PathBuf>),
     say: Verbosity,
 ) -> anyhow::Result<Outcome> {
     let Some(structure) = &flags.structure else {
@@ -101,7 +101,11 @@ pub(super) fn run(
     check_distinct(logs)?;
     let mut read = paths(logs);
     read.push(structure);
-    let output = output.map(|o| Output::check(o, &read)).transpose()?;
+    let (output, report) = Output::check_both(
+        output.map(PathBuf::as_path),
+        report.map(PathBuf::as_path),
+        &read,
+    )?;
     let loaded = load(structure)?;
     tell_warnings(&loaded, say);
     let plant = &loaded.plant;
@@ -133,28 +137,49 @@ pub(super) fn run(
     document.recordings = recordings;
     let samples: usize = logs.iter().map(Log::samples).sum();
     let title = format!("{} from {samples} samples", plant.spec.name);
-    write_and_tell(&document, &title, output.as_ref(), say)?;
+    let drawn = match &report {
+        Some(report) => Some((report, page(plant, &document, &records)?)),
+        None => None,
+    };
+    write_and_tell(&document, &title, output.as_ref(), drawn, say)?;
     Ok(Outcome::Done)
 }
 
-/// Writes the document, and says what was estimated.
+/// Writes the document and the page, and says what was estimated.
 pub(super) fn write_and_tell(
     document: &PlantDocument,
     title: &str,
     output: Option<&Output>,
+    page: Option<(&Output, String)>,
     say: Verbosity,
 ) -> anyhow::Result<()> {
     if let Some(output) = output {
         output.write(&document.to_json()?)?;
     }
-    if say.quiet || output.is_some_and(Output::is_stdout) {
+    if let Some((report, page)) = &page {
+        report.write(page)?;
+    }
+    let files = || output.into_iter().chain(page.as_ref().map(|p| p.0));
+    if say.quiet || files().any(Output::is_stdout) {
         return Ok(());
     }
     print(&plant_estimate_text(document, title, style()))?;
-    if let Some(output) = output {
-        print(&format!("\nwritten to {}\n", output.path().display()))?;
+    for (index, output) in files().enumerate() {
+        let gap = if index == 0 { "\n" } else { "" };
+        print(&format!("{gap}written to {}\n", output.path().display()))?;
     }
     Ok(())
+}
+
+/// The page of an estimated plant.
+fn page(
+    plant: &Plant,
+    document: &PlantDocument,
+    records: &[PlantRecording],
+) -> anyhow::Result<String> {
+    let (_, point) = document.plant().map_err(anyhow::Error::msg)?;
+    let found = evaluate(plant, records, &document.held_with_starts(plant, &point))?;
+    Ok(plant_page(plant, document, records, &found)?)
 }
 
 /// Which parameters are free.

@@ -7,19 +7,23 @@ use serde::Serialize;
 
 use super::numbers;
 use super::output::{check_distinct, print};
+use super::plant::{is_plant_file, load, read_recordings, recording};
 use super::roles::{RoleFlags, tell_reading};
+use super::terminal::style;
 use super::{Outcome, Verbosity};
 use crate::identify::{Model, Recording};
 use crate::log::{Log, Reading, RoleNeed, Source, check_same_sampling};
 use crate::moments::Detrend;
-use crate::report::text::validation_text;
-use crate::report::{read_model, to_json};
-use crate::validate::{Deviations, Relation, Validation, Zero, judge};
+use crate::physics::estimate::PlantRecording;
+use crate::report::text::{plant_validation_text, validation_text};
+use crate::report::{judge_plant, read_model, text_alone, to_json};
+use crate::validate::{Deviations, Relation, Zero, judge};
 
 const EXAMPLE: &str = "Examples:
   innovant validate model.json fresh.csv && echo the model holds
   innovant validate model.json fresh.csv --detrend mean     another operating point
   innovant validate model.json fresh.csv --format json | jq .whiteness.p_value
+  innovant validate plant.json fresh.csv                    a plant in equations: initial states are estimated
 
 Exit codes: 0 accepted; 1 rejected; 2 an error.";
 
@@ -31,7 +35,7 @@ Exit codes: 0 accepted; 1 rejected; 2 an error.";
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(super) struct Flags {
-    /// Model, as `innovant identify --output` writes it, or {"A":..,"B":..,"C":..,"dt":..}
+    /// Model, as `innovant identify --output` writes it, or {"A":..,"B":..,"C":..,"dt":..}, or a plant in equations (.mo)
     #[arg(value_name = "MODEL")]
     model: PathBuf,
     /// Recordings: CSV, also gzipped; `-` is standard input
@@ -70,18 +74,27 @@ enum Format {
 
 /// The result as a document.
 #[derive(Serialize)]
-struct ValidationDocument<'a> {
+struct ValidationDocument<'a, V> {
     format: &'static str,
     model: String,
     recordings: Vec<Recording>,
     #[serde(flatten)]
-    validation: &'a Validation,
+    validation: &'a V,
 }
 
 pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     let mut sources = flags.logs.clone();
     sources.insert(0, Source::from(flags.model.clone()));
     check_distinct(&sources)?;
+    if is_plant_file(&flags.model) {
+        if flags.detrend.is_some() {
+            anyhow::bail!(
+                "{}: --detrend belongs to linear models; a plant in equations is compared with the recording as it is",
+                flags.model.display()
+            );
+        }
+        return validate_plant(&flags, say);
+    }
     let model = read_model(&flags.model)?.model;
     if model.inputs.is_empty() {
         anyhow::bail!(
@@ -142,6 +155,44 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     })
 }
 
+/// A plant in equations: its parameters are held, the initial states of the recordings are estimated.
+fn validate_plant(flags: &Flags, say: Verbosity) -> anyhow::Result<Outcome> {
+    let name = flags.model.display().to_string();
+    let loaded = load(&flags.model)?;
+    let plant = &loaded.plant;
+    let (logs, recordings) =
+        read_recordings(plant, &flags.logs, &flags.roles, RoleNeed::Identify, say)?;
+    let records: Vec<PlantRecording> = logs.iter().map(recording).collect();
+    let held = match &loaded.document {
+        None => text_alone(&loaded.point, loaded.hold),
+        Some(document) => {
+            for log in &logs {
+                let expected = document.sample_time.unwrap_or(log.sample_time);
+                check_same_sampling(&name, expected, &log.name, log.sample_time)?;
+            }
+            let own = all_known(&document.recordings, &logs);
+            document.held(plant, &loaded.point, own)
+        }
+    };
+    let (found, _) = judge_plant(plant, &records, &held, flags.level)
+        .map_err(|e| anyhow::anyhow!("{name}: {e}"))?;
+    match flags.format {
+        Format::Json => print(&to_json(&ValidationDocument {
+            format: "innovant-plant-validation/1",
+            model: name,
+            recordings,
+            validation: &found,
+        })?)?,
+        Format::Text if say.quiet => {}
+        Format::Text => print(&plant_validation_text(&found, style()))?,
+    }
+    Ok(if found.rejected {
+        Outcome::Rejected
+    } else {
+        Outcome::Done
+    })
+}
+
 /// Whether the sampling of a recording is that of the model, to 0.1 %.
 pub(super) fn check_sampling(name: &str, model: &Model, log: &Log) -> anyhow::Result<()> {
     let (expected, found) = (model.system.sample_time, log.sample_time);
@@ -158,15 +209,18 @@ pub(super) fn check_sampling(name: &str, model: &Model, log: &Log) -> anyhow::Re
 
 /// The recordings are those of the estimation when all of them are.
 fn relation(model: &Model, logs: &[Log]) -> Relation {
-    let known = |log: &Log| {
-        model
-            .recordings
-            .iter()
-            .any(|r| r.sha256.is_some() && r.sha256 == log.sha256)
-    };
-    if logs.iter().all(known) {
+    if all_known(&model.recordings, logs) {
         Relation::Estimation
     } else {
         Relation::Fresh
     }
+}
+
+/// Whether every log is one of the recordings, by its SHA-256.
+fn all_known(recordings: &[Recording], logs: &[Log]) -> bool {
+    logs.iter().all(|log| {
+        recordings
+            .iter()
+            .any(|r| r.sha256.is_some() && r.sha256 == log.sha256)
+    })
 }

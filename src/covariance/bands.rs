@@ -134,7 +134,12 @@ fn trusted(band: &ResponseBand) -> bool {
         || magnitude_std(band.response, &band.covariance) <= LARGEST_RELATIVE_STD * size
 }
 
-fn linear_band(response: Complex64, covariance: &Covariance2, nu: Option<f64>) -> ResponseBand {
+/// Bands of a response by first-order propagation, `nu` degrees of freedom.
+pub(crate) fn linear_band(
+    response: Complex64,
+    covariance: &Covariance2,
+    nu: Option<f64>,
+) -> ResponseBand {
     let size = response.norm();
     let phase = response.arg();
     let (on_magnitude, on_phase) = if longest_axis(covariance) == 0.0 {

@@ -31,7 +31,7 @@ pub struct Invariants {
     pub step_response: Vec<StepResponse>,
 }
 
-/// A pole or a zero in the `z` plane.
+/// A pole or a zero in the `z` plane; of a plant in equations, which has no sample time, in the `s` plane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Root {
     /// Real part.
@@ -48,7 +48,7 @@ pub struct Root {
     pub damping: Option<f64>,
     /// Its standard deviation.
     pub damping_std: Option<f64>,
-    /// Time constant in seconds, negative outside the unit circle; null on it.
+    /// Time constant in seconds, negative for an unstable one; null at the limit of stability.
     pub time_constant_s: Option<f64>,
     /// Its standard deviation in seconds.
     pub time_constant_std: Option<f64>,

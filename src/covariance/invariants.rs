@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
+use num_complex::Complex64;
 
 use super::bands::{ResponseBand, response_bands};
 use super::document::{Invariants, ResponsePoint, Root, StaticGain, StepResponse};
@@ -145,28 +146,37 @@ fn points(
         let response = path.response(system, w);
         for (i, input) in inputs.iter().enumerate() {
             for (o, output) in outputs.iter().enumerate() {
-                let g = response[(o, i)];
                 let band = bands.as_ref().map(|b| b[index][(o, i)]);
-                points.push(ResponsePoint {
-                    rad_s: w,
-                    hz: w / TAU,
-                    output: output.clone(),
-                    input: input.clone(),
-                    real: finite(g.re),
-                    imag: finite(g.im),
-                    covariance: band.and_then(|b| finite_covariance(b.covariance)),
-                    magnitude: finite(g.norm()),
-                    magnitude_95: band.and_then(|b| finite_pair(b.magnitude_95)),
-                    magnitude_99: band.and_then(|b| finite_pair(b.magnitude_99)),
-                    phase_rad: finite(g.arg()),
-                    phase_95: band.and_then(|b| finite_pair(b.phase_95)),
-                    phase_99: band.and_then(|b| finite_pair(b.phase_99)),
-                    method: band.map(|b| b.method),
-                });
+                points.push(response_point(w, (output, input), response[(o, i)], band));
             }
         }
     }
     Ok(points)
+}
+
+/// A response of a path (output, input) with its bands.
+pub(crate) fn response_point(
+    w: f64,
+    (output, input): (&str, &str),
+    g: Complex64,
+    band: Option<ResponseBand>,
+) -> ResponsePoint {
+    ResponsePoint {
+        rad_s: w,
+        hz: w / TAU,
+        output: output.to_owned(),
+        input: input.to_owned(),
+        real: finite(g.re),
+        imag: finite(g.im),
+        covariance: band.and_then(|b| finite_covariance(b.covariance)),
+        magnitude: finite(g.norm()),
+        magnitude_95: band.and_then(|b| finite_pair(b.magnitude_95)),
+        magnitude_99: band.and_then(|b| finite_pair(b.magnitude_99)),
+        phase_rad: finite(g.arg()),
+        phase_95: band.and_then(|b| finite_pair(b.phase_95)),
+        phase_99: band.and_then(|b| finite_pair(b.phase_99)),
+        method: band.map(|b| b.method),
+    }
 }
 
 fn static_gain(

@@ -42,6 +42,7 @@ mod subspace;
 mod zeros;
 
 pub use asymptotic::{AsymptoticMethod, asymptotic_covariance};
+pub(crate) use bands::linear_band;
 pub use bands::{
     BandMethod, DRAWS, LARGEST_RELATIVE_STD, ResponseBand, SMALLEST_POLE_DISTANCE, response_bands,
 };
@@ -52,10 +53,12 @@ pub use frequency_response::{Path, frequency_response_covariance, noise_response
 pub use gradient::Covariance2;
 pub(crate) use gradient::projected_variance;
 pub use invariants::invariants;
+pub(crate) use invariants::response_point;
 pub use jackknife::jackknife_covariance;
 pub use nested::NestedErrors;
 pub(crate) use nested::newest_first;
 pub use parameters::{ParameterCovariance, ParameterLayout};
+pub(crate) use poles::{DEFECTIVE, continuous_stds};
 pub use poles::{PoleUncertainty, pole_uncertainties};
 pub use quantile::{ellipse_quantile, interval_quantile};
 pub use response::{impulse_response_std, static_gain_std, step_response_std};

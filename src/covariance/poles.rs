@@ -11,7 +11,7 @@ use crate::model::{Pole, StateSpace, slowest_first};
 /// Condition number `|w| |v|` (with `w v = 1`) of an eigenvalue beyond which it is multiple to working
 /// precision: its derivative is then mostly rounding, and near a double pole the eigenvalue moves like
 /// the square root of the error anyway.
-const DEFECTIVE: f64 = 1e7;
+pub(crate) const DEFECTIVE: f64 = 1e7;
 
 /// A pole or a zero with what is known about its place.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,13 +58,24 @@ impl PoleUncertainty {
             )
             .sqrt()
         };
-        let w = s.norm();
-        made.natural_frequency_std = Some(std(s.re / w, s.im / w));
-        // zeta = -Re s / |s|: d zeta = -(Im s)^2 / |s|^3 dRe s + Re s Im s / |s|^3 dIm s
-        made.damping_std = Some(std(-s.im * s.im / w.powi(3), s.re * s.im / w.powi(3)));
-        made.time_constant_std = pole.time_constant.map(|_| std(1.0 / (s.re * s.re), 0.0));
+        let [natural_frequency, damping, time_constant] = continuous_stds(s, std);
+        made.natural_frequency_std = Some(natural_frequency);
+        made.damping_std = Some(damping);
+        made.time_constant_std = pole.time_constant.map(|_| time_constant);
         made
     }
+}
+
+/// Standard deviations of natural frequency, damping and time constant of a pole `s`, where `std(a, b)` is that of
+/// `a Re s + b Im s`.
+pub(crate) fn continuous_stds(s: Complex64, std: impl Fn(f64, f64) -> f64) -> [f64; 3] {
+    let w = s.norm();
+    [
+        std(s.re / w, s.im / w),
+        // zeta = -Re s / |s|: d zeta = -(Im s)^2 / |s|^3 dRe s + Re s Im s / |s|^3 dIm s
+        std(-s.im * s.im / w.powi(3), s.re * s.im / w.powi(3)),
+        std(1.0 / (s.re * s.re), 0.0),
+    ]
 }
 
 /// Poles with their uncertainty, in the order of [`StateSpace::poles`]. First order, with left and right

@@ -10,6 +10,7 @@ pub mod estimate;
 mod expression;
 pub mod external;
 mod modelica;
+mod operating_point;
 mod simulated;
 mod simulation;
 mod sort;
@@ -19,6 +20,7 @@ mod units;
 
 pub use error::{SpecError, SpecErrorKind};
 pub use expression::{Binary, ExpressionId, Expressions, Function, Node, Span, VariableId};
+pub use operating_point::{Linearisation, OperatingPlant, OperatingPoint, OperatingPointError};
 pub use simulated::{Run, RunError, Simulated, Slopes};
 pub use simulation::{
     Direction, Excitation, Hold, LinearPlant, Observer, Plan, Plant, Point, SimulationError,

@@ -1,7 +1,24 @@
 //! The text of a plant with other values.
 
 use super::expression::VariableId;
+use super::simulation::{Plant, Point};
 use super::spec::{ModelSpec, VariableKind};
+
+impl Plant {
+    /// The text with the parameters of `point`; those that have their value already stay as they were written.
+    pub fn text_at(&self, point: &Point) -> String {
+        let written = Self::new(self.spec.clone()).nominal().parameters;
+        let values: Vec<(VariableId, f64)> = self
+            .spec
+            .parameters()
+            .into_iter()
+            .zip(point.parameters.iter().zip(written))
+            .filter(|(_, (value, written))| **value != *written)
+            .map(|(v, (value, _))| (v, *value))
+            .collect();
+        self.spec.text_with(&values)
+    }
+}
 
 impl ModelSpec {
     /// The text with these values of parameters, all else as it was written.

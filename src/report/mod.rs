@@ -13,6 +13,8 @@
 //! | `plant_fit`      | how an estimated plant follows its recordings                     |
 //! | `plant_document` | the keys of `innovant-plant/1`                                    |
 //! | `simulator_document` | the external simulator in it                                 |
+//! | `plant_linearisation` | a plant at an operating point: poles, gains, responses      |
+//! | `plant_validation` | the judgement of a plant on recordings                        |
 //! | `reproduction_csv` | all numbers of a reproduction as one long table                 |
 //!
 //! # The same input gives the same bytes
@@ -34,6 +36,8 @@ mod packed;
 mod page;
 mod plant_document;
 mod plant_fit;
+mod plant_linearisation;
+mod plant_validation;
 mod read;
 mod read_explanation;
 mod reproduction_csv;
@@ -55,9 +59,19 @@ pub use packed::CovarianceDocument;
 pub use page::PageError;
 pub use page::explanation::explanation_page;
 pub use page::identification::identification_page;
+pub use page::plant::plant_page;
 pub use page::reproduction::reproduction_page;
-pub use plant_document::{FitDocument, PLANT_FORMAT, PlantDocument, is_plant};
+pub use plant_document::{
+    FitDocument, InitialStateDocument, PLANT_FORMAT, PlantDocument, TestDocument, is_plant,
+};
 pub use plant_fit::plant_fits;
+pub use plant_linearisation::{
+    IdentifiedDocument, LINEARISATION_FORMAT, LinearisationDocument, OperatingValue, Uncertain,
+    frequency_grid, logarithmic,
+};
+pub use plant_validation::{
+    InnovationSizeDocument, JudgeError, PlantValidation, judge_plant, text_alone,
+};
 pub use read::{ReadModel, parse_model, read_model};
 pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
 pub use reproduction_csv::reproduction_csv;

@@ -10,7 +10,7 @@ use super::matrix::Rows;
 use super::read::{broken, no_document};
 use super::simulator_document::SimulatorDocument;
 use crate::identify::Recording;
-use crate::physics::estimate::{Form, PlantEstimate, Question};
+use crate::physics::estimate::{Form, PlantEstimate, Question, ResidualTest};
 use crate::physics::{Hold, Plant, Point, Simulated, parse};
 
 /// Kind and version of the document.
@@ -170,11 +170,51 @@ fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
+/// Initial states of each recording.
+pub(super) fn initial_states(
+    plant: &dyn Simulated,
+    points: &[Point],
+    stds: &[Vec<f64>],
+) -> Vec<Vec<InitialStateDocument>> {
+    let spec = plant.spec();
+    let states = spec.states();
+    let of_point = |(point, stds): (&Point, &Vec<f64>)| {
+        let start = plant.start(point);
+        let each = states.iter().zip(start).zip(stds);
+        each.map(|((&v, value), &std)| InitialStateDocument {
+            name: spec.variable(v).column().to_owned(),
+            value,
+            std: finite(std),
+        })
+        .collect()
+    };
+    points.iter().zip(stds).map(of_point).collect()
+}
+
+/// Tests of the residuals of outputs with these names.
+pub(super) fn test_documents(tests: &[ResidualTest], outputs: &[String]) -> Vec<TestDocument> {
+    let question = |question| match question {
+        Question::White => "white",
+        Question::Inputs => "inputs",
+        Question::Products => "products",
+    };
+    tests
+        .iter()
+        .map(|t| TestDocument {
+            output: outputs[t.output].clone(),
+            question: question(t.question).to_owned(),
+            statistic: t.statistic,
+            degrees: t.degrees,
+            p_value: t.p_value,
+        })
+        .collect()
+}
+
 impl PlantDocument {
     /// The document of an estimate; fits and recordings are added by the caller.
     pub fn new(plant: &dyn Simulated, estimate: &PlantEstimate, hold: Hold) -> Self {
         let spec = plant.spec();
-        let (parameters, states) = (spec.parameters(), spec.states());
+        let parameters = spec.parameters();
         let nominal = plant.nominal();
         let name = |v| spec.variable(v).column().to_owned();
         let outputs: Vec<String> = spec.outputs().into_iter().map(name).collect();
@@ -216,21 +256,7 @@ impl PlantDocument {
             }
             .to_owned(),
             observer_gain: estimate.gain.as_ref().map(Rows::from),
-            initial_states: estimate
-                .points
-                .iter()
-                .zip(&estimate.start_std)
-                .map(|(point, stds)| {
-                    let start = plant.start(point);
-                    let each = states.iter().zip(start).zip(stds);
-                    each.map(|((&v, value), &std)| InitialStateDocument {
-                        name: name(v),
-                        value,
-                        std: finite(std),
-                    })
-                    .collect()
-                })
-                .collect(),
+            initial_states: initial_states(plant, &estimate.points, &estimate.start_std),
             noise: outputs
                 .iter()
                 .enumerate()
@@ -243,22 +269,7 @@ impl PlantDocument {
                 .collect(),
             noise_degrees_of_freedom: finite(*degrees),
             fit: Vec::new(),
-            residual_tests: estimate
-                .tests
-                .iter()
-                .map(|t| TestDocument {
-                    output: outputs[t.output].clone(),
-                    question: match t.question {
-                        Question::White => "white",
-                        Question::Inputs => "inputs",
-                        Question::Products => "products",
-                    }
-                    .to_owned(),
-                    statistic: t.statistic,
-                    degrees: t.degrees,
-                    p_value: t.p_value,
-                })
-                .collect(),
+            residual_tests: test_documents(&estimate.tests, &outputs),
             undetermined: estimate
                 .undetermined
                 .iter()

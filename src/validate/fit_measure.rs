@@ -105,6 +105,33 @@ impl FitSums {
     }
 }
 
+/// Fit of predictions: for each record a pair of recorded and predicted values for each output. What was not recorded does not
+/// count.
+///
+/// # Errors
+/// [`ValidateError::ConstantOutput`] when an output does not move.
+pub fn fit_measure(
+    output_names: &[String],
+    records: &[Vec<(&[f64], &[f64])>],
+) -> Result<FitMeasure, ValidateError> {
+    let mut sums = FitSums::new(output_names.len());
+    for record in records {
+        for (output, (recorded, predicted)) in record.iter().enumerate() {
+            let known = recorded
+                .iter()
+                .zip(*predicted)
+                .filter(|(y, _)| y.is_finite());
+            let (y, errors): (Vec<f64>, Vec<f64>) = known.map(|(y, p)| (*y, y - p)).unzip();
+            sums.add(output, &y, &errors);
+        }
+        sums.end_record();
+    }
+    sums.measure(&ValidationOptions {
+        output_names: output_names.to_vec(),
+        ..ValidationOptions::default()
+    })
+}
+
 /// Error below this share of the output that is left to rounding: the square root of working precision.
 const EXACT: f64 = 1.5e-8;
 

@@ -71,6 +71,7 @@ mod tests;
 
 pub use deviations::{Deviations, Zero, judge};
 pub use error::ValidateError;
+pub use fit_measure::fit_measure;
 pub use identified::{TestedModel, identify_and_test, test_residuals};
 pub(crate) use length::too_short;
 pub use options::{RecordView, Relation, ValidationOptions};

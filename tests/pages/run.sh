@@ -30,6 +30,12 @@ sed '1s/.*/t,"u<script>alert(1)<\/script>","u<img src=x onerror=alert(2)>","y<a 
 innovant identify "$folder/names.csv" --inputs 'u<script>alert(1)</script>,u<img src=x onerror=alert(2)>' \
     --outputs 'y<a href="javascript:alert(3)">z</a>,y&amp;<b>' --report "$folder/identify-names.html"
 
+# Plants in equations: one output, two outputs, and one that is not determined.
+for plant in tanks motor; do
+    innovant identify data/plants/$plant.csv --structure data/plants/$plant.mo --report "$folder/plant-$plant.html"
+done
+innovant identify data/plants/pendulum.csv --structure data/plants/pendulum.mo --report "$folder/plant-pendulum.html"
+
 # One of each answer: effects with a simulation as columns and as a model, nothing missing, other parameters, and what
 # is left when the library lacks the truth.
 cases=data/concealed

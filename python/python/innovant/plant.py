@@ -120,15 +120,44 @@ class Plant:
         if len(us) != len(ys):
             raise _innovant.InnovantError(f"u holds {len(us)} recordings and y {len(ys)}")
         document, text = self._plant.fit(us, ys, dt, list(fix), hold, form, least_squares)
-        return PlantEstimate(document, text)
+        return PlantEstimate(document, text, (us, ys, dt))
 
     def linearise(
         self, state: Mapping[str, float] | None = None, inputs: Sequence[float] | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Continuous-time ``A, B, C, D`` at a state (those not given are the start values of the text) and inputs (zero);
         ``control.ss(*plant.linearise())`` is a system of python-control."""
-        given = [0.0] * len(self.inputs) if inputs is None else [float(v) for v in inputs]
-        return self._plant.linearise(list((state or {}).items()), given)
+        return self._plant.linearise(list((state or {}).items()), self._given(inputs))
+
+    def linearisation(
+        self,
+        state: Mapping[str, float] | None = None,
+        inputs: Sequence[float] | None = None,
+        frequencies: Sequence[float] = (),
+    ) -> dict[str, Any]:
+        """The document ``innovant-linearisation/1``: ``poles`` (natural frequency, damping, time constant),
+        ``static_gain`` and ``frequency_response`` (``frequencies`` in rad/s; a grid about the poles) at the equilibrium
+        with these inputs (zero), or at a state. Those of an estimate have standard deviations and bands, which follow
+        from the covariance of the parameters."""
+        at = None if state is None else list(state.items())
+        return json.loads(self._plant.linearisation(at, self._given(inputs), [float(w) for w in frequencies]))
+
+    def to_modelica(self) -> str:
+        """The equations with the values of the parameters."""
+        return self._plant.modelica()
+
+    def to_control(
+        self, state: Mapping[str, float] | None = None, inputs: Sequence[float] | None = None
+    ) -> Any:
+        """``linearise`` as a ``control.StateSpace`` of python-control, in continuous time."""
+        import control
+
+        return control.StateSpace(
+            *self.linearise(state, inputs), inputs=self.inputs, outputs=self.outputs, states=self.states
+        )
+
+    def _given(self, inputs: Sequence[float] | None) -> list[float]:
+        return [0.0] * len(self.inputs) if inputs is None else [float(v) for v in inputs]
 
     def __str__(self) -> str:
         return self._plant.text()
@@ -167,6 +196,12 @@ class Estimate:
 class PlantEstimate(Estimate, Plant):
     """A plant with estimated parameters."""
 
-    def __init__(self, document: str, text: str) -> None:
+    def __init__(self, document: str, text: str, recordings: tuple[list[np.ndarray], list[np.ndarray], float]) -> None:
         Estimate.__init__(self, document, text)
         Plant.__init__(self, document)
+        self._recordings = recordings
+
+    def report(self, path: str | os.PathLike[str]) -> None:
+        """Writes a page: parameters, recorded and simulated outputs, residuals and equations, in one file that opens
+        offline."""
+        Path(path).write_text(self._plant.page(*self._recordings), encoding="utf-8")

@@ -33,7 +33,7 @@ pub enum Question {
 const LAGS: usize = 20;
 const INPUT_LAGS: usize = 8;
 /// Values that each degree of freedom needs.
-const VALUES_A_DEGREE: usize = 10;
+pub(super) const VALUES_A_DEGREE: usize = 10;
 
 /// Ljung and Box's test of series of one output, one a recording; `fitted` coefficients of the noise model were taken from it.
 pub(super) fn white(output: usize, series: &[&[f64]], fitted: usize) -> Option<ResidualTest> {
@@ -104,7 +104,13 @@ pub(super) fn score(
     test(output, question, n as f64 * explained / total, degrees - 1)
 }
 
-fn test(output: usize, question: Question, statistic: f64, degrees: usize) -> Option<ResidualTest> {
+/// A chi-square statistic as a test.
+pub(super) fn test(
+    output: usize,
+    question: Question,
+    statistic: f64,
+    degrees: usize,
+) -> Option<ResidualTest> {
     let law = ChiSquared::new(degrees as f64).ok()?;
     statistic.is_finite().then(|| ResidualTest {
         output,

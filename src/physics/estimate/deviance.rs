@@ -177,6 +177,12 @@ impl<'p, 'a> Deviance<'p, 'a> {
         matrix.iter().all(|v| v.is_finite()).then_some(matrix)
     }
 
+    /// Whitened derivatives of the predictions at a point: a row for each value that counts, a column for each free number.
+    pub fn derivatives(&mut self, point: &[f64]) -> Option<DMatrix<f64>> {
+        let runs = self.at(point)?;
+        self.jacobian(&runs)
+    }
+
     /// Covariances of the free numbers.
     pub fn covariances(&mut self, point: &[f64]) -> Covariances {
         let m = point.len();
@@ -280,7 +286,7 @@ impl Objective for Deviance<'_, '_> {
 }
 
 /// Inverse of an information matrix, on the scale of its own diagonal; what moves nothing has an infinite variance.
-fn invert(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+pub(super) fn invert(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let m = information.nrows();
     let used: Vec<usize> = (0..m).filter(|&i| information[(i, i)] > 0.0).collect();
     let scale: Vec<f64> = used.iter().map(|&i| information[(i, i)].sqrt()).collect();

@@ -9,6 +9,7 @@
 mod adequacy;
 mod determined;
 mod deviance;
+mod evaluate;
 mod observer;
 mod optimise;
 mod problem;
@@ -16,6 +17,7 @@ mod profile;
 
 pub use adequacy::{Question, ResidualTest};
 pub use determined::Undetermined;
+pub use evaluate::{Evaluation, Held, HeldNoise, evaluate};
 pub use problem::{EstimateError, PlantRecording};
 
 use nalgebra::DMatrix;

@@ -1,6 +1,7 @@
 //! A plant linearised at a point.
 
 use nalgebra::DMatrix;
+use num_complex::Complex64;
 
 use super::dual::Dual;
 use super::field::LANES;
@@ -25,6 +26,31 @@ pub struct LinearPlant {
 }
 
 impl LinearPlant {
+    /// `C (s I - A)^-1 B + D`, outputs by inputs; not a number at a pole.
+    pub fn response(&self, s: Complex64) -> DMatrix<Complex64> {
+        let complex = |m: &DMatrix<f64>| m.map(|v| Complex64::new(v, 0.0));
+        let n = self.a.nrows();
+        if n == 0 {
+            return complex(&self.d);
+        }
+        let resolvent = DMatrix::from_diagonal_element(n, n, s) - complex(&self.a);
+        match resolvent.lu().solve(&complex(&self.b)) {
+            Some(states) => complex(&self.c) * states + complex(&self.d),
+            None => complex(&self.d).map(|_| Complex64::new(f64::NAN, f64::NAN)),
+        }
+    }
+
+    /// The same of the system sampled every `sample_time` with its inputs held, at `w` rad/s.
+    pub fn sampled_response(&self, w: f64, sample_time: f64) -> DMatrix<Complex64> {
+        let (a, b) = self.discrete(sample_time);
+        let sampled = Self {
+            a,
+            b,
+            ..self.clone()
+        };
+        sampled.response(Complex64::from_polar(1.0, w * sample_time))
+    }
+
     /// `A` and `B` of the system sampled every `sample_time` with its inputs held.
     pub fn discrete(&self, sample_time: f64) -> (DMatrix<f64>, DMatrix<f64>) {
         let (n, m) = (self.a.nrows(), self.b.ncols());
@@ -110,6 +136,15 @@ impl Plant {
         let mut x = state.to_vec();
         for _ in 0..STEPS {
             let linear = self.linearise(point, &x, inputs, 0.0);
+            // Neither a slope of infinity (a root at 0) nor a derivative without value leads anywhere.
+            if !linear
+                .a
+                .iter()
+                .chain(&linear.derivative)
+                .all(|v| v.is_finite())
+            {
+                return None;
+            }
             let size = x.iter().map(|x| x.abs()).fold(1.0, f64::max);
             let right = nalgebra::DVector::from_vec(linear.derivative.clone());
             let sound = |v: &f64| v.abs() < LARGEST;

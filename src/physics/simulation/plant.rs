@@ -225,17 +225,19 @@ impl Plant {
         }
     }
 
-    /// Values of the text: those of parameters, and no start value of its own.
+    /// Values of the text, or those it was given in their place: those of parameters, and no start value of its own.
     pub fn nominal(&self) -> Point {
         let mut frame = self.tape.frame::<0>();
         self.tape.run_parameters(&mut frame);
-        Point {
-            parameters: self
-                .tape
+        let of_text = || {
+            self.tape
                 .nominal
                 .iter()
                 .map(|&p| frame.slot[p].value)
-                .collect(),
+                .collect()
+        };
+        Point {
+            parameters: self.nominal.clone().unwrap_or_else(of_text),
             start: vec![None; self.tape.states.len()],
         }
     }

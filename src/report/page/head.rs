@@ -31,6 +31,15 @@ pub(super) fn sections(
         .collect()
 }
 
+/// The first letter large.
+pub(super) fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    match letters.next() {
+        Some(first) => first.to_uppercase().chain(letters).collect(),
+        None => String::new(),
+    }
+}
+
 /// A table as the template writes it: the first cell of a row is its name.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub(super) struct Table {

@@ -3,7 +3,7 @@
 //!
 //! | file             | one idea                                                              |
 //! |------------------|-----------------------------------------------------------------------|
-//! | `explanation`, `identification`, `reproduction` | what each page shows                   |
+//! | `explanation`, `identification`, `plant`, `reproduction` | what each page shows          |
 //! | `plot`           | a picture as data: axes, series, shaded windows                       |
 //! | `thin`           | long lines thinned, digits that a screen can show                     |
 //! | `number`         | how numbers are written                                               |
@@ -21,6 +21,7 @@ mod head;
 pub(in crate::report) mod identification;
 mod library;
 mod number;
+pub(in crate::report) mod plant;
 mod plot;
 pub(in crate::report) mod reproduction;
 mod source;

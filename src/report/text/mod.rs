@@ -1,10 +1,12 @@
 //! Tables for people: nothing wider than a hundred columns.
 
 mod explanation_text;
+mod linearisation_text;
 mod model_text;
 mod number;
 mod orders;
 mod plant_text;
+mod plant_validation_text;
 mod reproduction_text;
 mod roots;
 mod show;
@@ -13,11 +15,16 @@ mod validation_text;
 mod verdict;
 
 pub use explanation_text::explanation_text;
+pub use linearisation_text::linearisation_text;
 pub use model_text::{ModelText, model_text};
 pub(crate) use model_text::{fit_table, method};
+pub(crate) use number::percent;
 pub use orders::comparison;
 pub(crate) use orders::order_table;
+pub(crate) use plant_text::{parameter_table, verdict as plant_verdict};
 pub use plant_text::{plant_estimate_text, plant_text};
+pub use plant_validation_text::plant_validation_text;
+pub(crate) use plant_validation_text::{initial_state_table, residual_test_table, tests_fail};
 pub use reproduction_text::reproduction_text;
 pub(crate) use roots::{gain_table, pole_table};
 pub use show::show_text;

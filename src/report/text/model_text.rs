@@ -12,7 +12,7 @@ use super::{Style, comparison, wrapped};
 use crate::covariance::{Invariants, invariants};
 use crate::identify::{CovarianceKind, Model, Summary};
 use crate::report::names;
-use crate::validate::Validation;
+use crate::validate::{FitMeasure, Validation};
 
 /// Poles and gains that a summary lists.
 const LINES_SHOWN: usize = 12;
@@ -113,6 +113,11 @@ pub(super) fn fit(tests: &Validation) -> String {
 
 /// The same as a table.
 pub(crate) fn fit_table(tests: &Validation) -> Table {
+    fit_measures(&tests.one_step, tests.free_run.as_ref())
+}
+
+/// Fits one step ahead and in free run.
+pub(super) fn fit_measures(one_step: &FitMeasure, free_run: Option<&FitMeasure>) -> Table {
     let mut table = Table::new([
         "output",
         "one step ahead",
@@ -120,8 +125,8 @@ pub(crate) fn fit_table(tests: &Validation) -> Table {
         "free run",
         "rms error",
     ]);
-    for (index, one) in tests.one_step.outputs.iter().enumerate() {
-        let free = tests.free_run.as_ref().and_then(|f| f.outputs.get(index));
+    for (index, one) in one_step.outputs.iter().enumerate() {
+        let free = free_run.and_then(|f| f.outputs.get(index));
         table.row([
             shortened(&one.output),
             percent(one.fit_percent),

@@ -1,6 +1,7 @@
 //! A plant in equations, for people: what was read, and what was estimated.
 
-use super::number::{percent, probability, significant, with_std};
+use super::number::{percent, significant, with_std};
+use super::plant_validation_text::{initial_state_text, residual_test_table};
 use super::table::Table;
 use super::{Style, wrapped};
 use crate::physics::{ModelSpec, Plant, Unknown, Variable, VariableKind, unit_conflicts};
@@ -222,53 +223,55 @@ fn equilibrium(plant: &Plant) -> String {
 
 /// What was estimated.
 pub fn plant_estimate_text(document: &PlantDocument, title: &str, style: Style) -> String {
-    let external = document.simulator.as_ref();
-    let said = verdict(document, title);
-    let (said, in_text, of_text) = match external {
-        None => (said, "in the text", "values of the text"),
-        // The same is said of a simulator, which is no text of equations.
-        Some(_) => (
-            said.replace("the equations leave", "the simulator leaves"),
-            "given",
-            "values given",
-        ),
-    };
-    let mut out = wrapped("", &said);
+    let mut out = wrapped("", &verdict(document, title));
     if !document.parameters.is_empty() {
         out += "\nParameters\n";
-        let mut table = Table::new(["name", "estimate", "unit", "95 % interval", in_text, ""])
-            .flush_left(2)
-            .flush_left(5);
-        for p in &document.parameters {
-            let end = |e: Option<f64>| e.map_or("open".to_owned(), |e| significant(e, 6));
-            let [low, high] = p.interval_95.unwrap_or([None, None]);
-            table.row([
-                p.name.clone(),
-                with_std(Some(p.value), p.std, style),
-                p.unit.clone().unwrap_or_default(),
-                format!("{} to {}", end(low), end(high)),
-                p.text_value.map_or(String::new(), |v| significant(v, 6)),
-                if p.at_bound { "at its bound" } else { "" }.to_owned(),
-            ]);
-        }
-        out += &table.lines();
+        out += &parameter_table(document, style).lines();
     }
     for message in &document.undetermined {
         out += &wrapped("  ! ", message);
     }
-    if let Some(first) = document.initial_states.first().filter(|s| !s.is_empty()) {
-        out += if document.initial_states.len() > 1 {
-            "\nInitial states of the first recording\n"
-        } else {
-            "\nInitial states\n"
-        };
-        let mut table = Table::new(["state", "value"]);
-        for s in first {
-            table.row([s.name.clone(), with_std(Some(s.value), s.std, style)]);
-        }
-        out += &table.lines();
-    }
+    out += &initial_state_text(&document.initial_states, style);
     out += "\nFit in free run\n";
+    out += &plant_fit_table(document).lines();
+    out += "\nResiduals\n";
+    out += &residual_test_table(&document.residual_tests).lines();
+    if let Some(simulator) = &document.simulator {
+        out += &format!("\n{}", wrapped("", &simulator.said()));
+    }
+    out
+}
+
+/// The estimated parameters.
+pub(crate) fn parameter_table(document: &PlantDocument, style: Style) -> Table {
+    let in_text = match document.simulator {
+        None => "in the text",
+        Some(_) => "given",
+    };
+    let mut table = Table::new(["name", "estimate", "unit", "95 % interval", in_text, ""])
+        .flush_left(2)
+        .flush_left(5);
+    for p in &document.parameters {
+        let end = |e: Option<f64>| e.map_or("open".to_owned(), |e| significant(e, 6));
+        let [low, high] = p.interval_95.unwrap_or([None, None]);
+        table.row([
+            p.name.clone(),
+            with_std(Some(p.value), p.std, style),
+            p.unit.clone().unwrap_or_default(),
+            format!("{} to {}", end(low), end(high)),
+            p.text_value.map_or(String::new(), |v| significant(v, 6)),
+            if p.at_bound { "at its bound" } else { "" }.to_owned(),
+        ]);
+    }
+    table
+}
+
+/// Fits in free run.
+fn plant_fit_table(document: &PlantDocument) -> Table {
+    let of_text = match document.simulator {
+        None => "values of the text",
+        Some(_) => "values given",
+    };
     let mut table = Table::new([
         "output",
         "estimated",
@@ -290,32 +293,11 @@ pub fn plant_estimate_text(document: &PlantDocument, title: &str, style: Style) 
                 .map_or(String::new(), |n| n.to_string()),
         ]);
     }
-    out += &table.lines();
-    out += "\nResiduals\n";
-    let mut table = Table::new(["output", "question", "chi-square", "degrees", "p"]).flush_left(1);
-    for t in &document.residual_tests {
-        let question = match t.question.as_str() {
-            "white" => "white?",
-            "inputs" => "independent of past inputs?",
-            _ => "independent of products of inputs and outputs?",
-        };
-        table.row([
-            t.output.clone(),
-            question.to_owned(),
-            significant(t.statistic, 4),
-            t.degrees.to_string(),
-            probability(t.p_value),
-        ]);
-    }
-    out += &table.lines();
-    if let Some(simulator) = external {
-        out += &format!("\n{}", wrapped("", &simulator.said()));
-    }
-    out
+    table
 }
 
 /// The headline: the form, what the residuals and the free run say of the equations, and what is open.
-fn verdict(document: &PlantDocument, title: &str) -> String {
+pub(crate) fn verdict(document: &PlantDocument, title: &str) -> String {
     let tests = &document.residual_tests;
     let level = LEVEL / tests.len().max(1) as f64;
     let fails = |question: &str| {
@@ -357,13 +339,19 @@ fn verdict(document: &PlantDocument, title: &str) -> String {
             percent(f.free_run_percent)
         ));
     }
-    if depends || better.is_some() {
-        out.push("the equations leave something out; see `innovant explain`".to_owned());
-    } else if followed.is_some() {
-        out.push(
-            "either disturbances enter the states, or the equations leave something out; see `innovant explain`"
-                .to_owned(),
-        );
+    let leave = match document.simulator {
+        None => "the equations leave",
+        Some(_) => "the simulator leaves",
+    };
+    let either = if depends || better.is_some() {
+        Some("")
+    } else {
+        followed.map(|_| "either disturbances enter the states, or ")
+    };
+    if let Some(either) = either {
+        out.push(format!(
+            "{either}{leave} something out; see `innovant explain`"
+        ));
     }
     if !document.undetermined.is_empty() {
         out.push("not every parameter is determined".to_owned());

@@ -23,6 +23,30 @@ pub(super) fn poles(title: &str, roots: &[Root], most: usize, style: Style) -> S
 
 /// The same as a table.
 pub(crate) fn pole_table(roots: &[Root], most: usize, style: Style) -> Table {
+    pole_table_of(roots, most, style, kind)
+}
+
+/// Poles in the `s` plane.
+pub(crate) fn continuous_pole_table(roots: &[Root], style: Style) -> Table {
+    pole_table_of(roots, usize::MAX, style, |root| {
+        let word = match (root.imag == 0.0, root.damping) {
+            (true, None) => "integrator",
+            (true, _) => "real",
+            (false, _) => "pair",
+        };
+        match root.time_constant_s.is_some_and(|t| t < 0.0) {
+            true => format!("{word}, unstable"),
+            false => word.to_owned(),
+        }
+    })
+}
+
+fn pole_table_of(
+    roots: &[Root],
+    most: usize,
+    style: Style,
+    kind: impl Fn(&Root) -> String,
+) -> Table {
     let mut table = Table::new([
         "",
         "natural frequency [Hz]",

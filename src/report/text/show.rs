@@ -94,7 +94,8 @@ fn noise(model: &Model, style: Style) -> String {
     )
 }
 
-fn responses(points: &[ResponsePoint], every_frequency: bool) -> String {
+/// Frequency responses path by path, some of the frequencies or every one.
+pub(super) fn responses(points: &[ResponsePoint], every_frequency: bool) -> String {
     let mut out = String::new();
     let mut paths: Vec<(&str, &str)> = Vec::new();
     for point in points {

@@ -5,29 +5,19 @@ use super::number::{percent, probability, significant};
 use super::roots::shortened;
 use super::table::Table;
 use super::{count, wrapped};
-use crate::validate::{Relation, ResidualTest, Validation};
+use crate::validate::{Relation, ResidualTest, TooShort, Validation};
 
 /// Verdict, fit, tests and findings.
 pub fn validation_text(tests: &Validation) -> String {
-    let data = match tests.relation {
-        Relation::Estimation => "the recording it was estimated from",
-        Relation::Fresh => "a recording it has not seen",
-    };
-    let verdict = if tests.rejected {
-        format!(
-            "Model rejected on {data} ({} samples): a right model is, in {} of cases",
-            tests.samples,
-            percent(100.0 * tests.level)
-        )
-    } else if let Some(short) = &tests.too_short {
-        format!("On {data}: {}", short.sentence())
-    } else {
-        format!(
-            "Model accepted on {data} ({} samples): {}",
-            tests.samples,
-            in_words(tests)
-        )
-    };
+    let verdict = headline(&Headline {
+        what: "Model",
+        relation: tests.relation,
+        samples: tests.samples,
+        level: tests.level,
+        rejected: tests.rejected,
+        too_short: tests.too_short.as_ref(),
+        accepted: in_words(tests),
+    });
     let mut out = wrapped("", &verdict);
     out.push_str(&fit(tests));
     out.push_str(&residual_tests(tests));
@@ -39,6 +29,41 @@ pub fn validation_text(tests: &Validation) -> String {
         out.push_str(&wrapped("finding: ", sentence));
     }
     out
+}
+
+/// What a verdict says.
+pub(super) struct Headline<'a> {
+    pub what: &'static str,
+    pub relation: Relation,
+    pub samples: usize,
+    pub level: f64,
+    pub rejected: bool,
+    pub too_short: Option<&'a TooShort>,
+    /// What an acceptance rests on.
+    pub accepted: &'a str,
+}
+
+/// The first sentence.
+pub(super) fn headline(of: &Headline) -> String {
+    let data = match of.relation {
+        Relation::Estimation => "the recording it was estimated from",
+        Relation::Fresh => "a recording it has not seen",
+    };
+    let (what, samples) = (of.what, of.samples);
+    if of.rejected {
+        format!(
+            "{what} rejected on {data} ({samples} samples): a right {} is, in {} of cases",
+            what.to_lowercase(),
+            percent(100.0 * of.level)
+        )
+    } else if let Some(short) = of.too_short {
+        format!("On {data}: {}", short.sentence())
+    } else {
+        format!(
+            "{what} accepted on {data} ({samples} samples): {}",
+            of.accepted
+        )
+    }
 }
 
 /// What an acceptance rests on.

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::head::{Head, Table, sections};
+use super::head::{Head, Table, capitalised, sections};
 use super::number::{exact, with_unit};
 use super::plot::Group;
 use super::source::Source;
@@ -159,15 +159,6 @@ pub(super) fn view(
             ("Written by", format!("innovant {}", env!("CARGO_PKG_VERSION"))),
         ],
     })
-}
-
-/// The first letter large.
-fn capitalised(text: &str) -> String {
-    let mut letters = text.chars();
-    match letters.next() {
-        Some(first) => first.to_uppercase().chain(letters).collect(),
-        None => String::new(),
-    }
 }
 
 fn listed(of: &[IdentifiedChannel]) -> String {
