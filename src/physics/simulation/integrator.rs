@@ -4,7 +4,7 @@ use super::dual::Dual;
 use super::field::Field;
 use super::linear::Propagator;
 use super::plant::{Direction, Excitation, Observer};
-use super::step::Stages;
+use super::step::{Accuracy, Stages};
 
 /// Stages of a run with slopes are solved to this part of their move: below the error of any step.
 const REPLAYED: f64 = 1e-9;
@@ -149,8 +149,10 @@ impl<const M: usize> Integrator<'_, M> {
                         &time,
                         &part,
                         &self.x,
-                        scale,
-                        REPLAYED,
+                        &Accuracy {
+                            absolute: scale,
+                            relative: REPLAYED,
+                        },
                         &mut self.next,
                     );
                 }

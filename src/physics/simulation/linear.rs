@@ -274,17 +274,21 @@ impl<const M: usize> Propagator<M> {
             }
         }
         let n = x.len();
-        for (i, x) in x.iter_mut().enumerate() {
-            for j in 0..n {
-                *x = x.plus_product(1.0, &self.held[i * n + j], &rate[j]);
-            }
-            if let Some(ramp) = &self.ramp {
-                for j in 0..n {
-                    *x = x.plus_product(1.0, &ramp[i * n + j], &self.change[j]);
-                }
+        for (x, row) in x.iter_mut().zip(self.held.chunks(n)) {
+            *x = product(*x, row, rate);
+        }
+        if let Some(ramp) = &self.ramp {
+            for (x, row) in x.iter_mut().zip(ramp.chunks(n)) {
+                *x = product(*x, row, &self.change);
             }
         }
     }
+}
+
+/// `x` plus a row times a column.
+fn product<const M: usize>(x: Dual<M>, row: &[Dual<M>], column: &[Dual<M>]) -> Dual<M> {
+    let terms = row.iter().zip(column);
+    terms.fold(x, |sum, (a, b)| sum.plus_product(1.0, a, b))
 }
 
 fn multiply<const M: usize>(a: &[Dual<M>], b: &[Dual<M>], n: usize) -> Vec<Dual<M>> {

@@ -27,6 +27,14 @@ const ITERATIONS: usize = 12;
 /// A stage is solved to this part of the error that a step may have.
 const STAGE_ACCURACY: f64 = 0.02;
 
+/// To what the stages of an implicit step are solved.
+pub(super) struct Accuracy<'a> {
+    /// Error of each state.
+    pub absolute: &'a [f64],
+    /// The same as a part of the move of the state in the stage, where that is more.
+    pub relative: f64,
+}
+
 /// Room for the stages of a step.
 pub(super) struct Stages<const M: usize> {
     slopes: [Vec<Dual<M>>; 5],
@@ -120,16 +128,14 @@ impl<const M: usize> Stages<M> {
         clippy::needless_range_loop,
         reason = "a state is an element of several lists"
     )]
-    /// The implicit method. False when Newton's iteration does not converge to `accuracy` of each state, or to the part
-    /// `relative` of the move of the state in the stage where that is more.
+    /// The implicit method. False when Newton's iteration does not converge to `accuracy`.
     pub fn implicit(
         &mut self,
         field: &mut Field<M>,
         time: &Dual<M>,
         length: &Dual<M>,
         x: &[Dual<M>],
-        accuracy: &[f64],
-        relative: f64,
+        accuracy: &Accuracy,
         result: &mut [Dual<M>],
     ) -> bool {
         let n = x.len();
@@ -151,7 +157,7 @@ impl<const M: usize> Stages<M> {
                     _ => base + step * self.slopes[stage - 1][i].value,
                 };
             }
-            if !self.newton.solve(field, &at, step, accuracy, relative) {
+            if !self.newton.solve(field, &at, step, accuracy) {
                 return false;
             }
             let Newton {
@@ -228,19 +234,17 @@ impl Newton {
         }
     }
 
-    /// Solves from the guess in `z`. False when it does not converge to `accuracy` of each state, or to the part `relative` of
-    /// its move where that is more.
+    /// Solves from the guess in `z`. False when it does not converge to `accuracy`.
     fn solve<const M: usize>(
         &mut self,
         field: &mut Field<M>,
         at: &Dual<M>,
         step: f64,
-        accuracy: &[f64],
-        relative: f64,
+        accuracy: &Accuracy,
     ) -> bool {
         let n = self.base.len();
         let size = |of: &[f64]| {
-            let each = of.iter().zip(accuracy);
+            let each = of.iter().zip(accuracy.absolute);
             each.fold(0.0, |worst: f64, (r, a)| {
                 if r.is_finite() {
                     worst.max((r / a).abs().min(f64::MAX))
@@ -281,11 +285,11 @@ impl Newton {
             for (t, z) in self.taken.iter().zip(&mut self.z) {
                 *z += t;
             }
-            let rest = self.taken.iter().zip(accuracy).enumerate();
-            let solved = |(i, (t, a)): (usize, (&f64, &f64))| {
-                t.abs() <= STAGE_ACCURACY * a.max(relative * (self.z[i] - self.base[i]).abs())
+            let solved = |i: usize| {
+                let moved = accuracy.relative * (self.z[i] - self.base[i]).abs();
+                self.taken[i].abs() <= STAGE_ACCURACY * accuracy.absolute[i].max(moved)
             };
-            if rest.map(solved).all(|s| s) {
+            if (0..n).all(solved) {
                 return true;
             }
         }

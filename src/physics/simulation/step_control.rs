@@ -10,6 +10,7 @@ use super::dual::Dual;
 use super::field::Field;
 use super::integrator::{FINEST, IMPLICIT, Integrator};
 use super::plant::{Excitation, Plan, Plant, SimulationError};
+use super::step::Accuracy;
 use super::tape::{SwitchSlots, Tape};
 
 /// Error of one step that is allowed, as a part of how far a state has moved so far. Errors add up along the recording; with
@@ -317,7 +318,11 @@ impl<'p> StepControl<'p> {
         } = integrator;
         let end = time.plus(step, &one);
         let error = if self.implicit {
-            if !stages.implicit(field, time, &whole, x, &self.allowed, self.tolerance, next) {
+            let accuracy = Accuracy {
+                absolute: &self.allowed,
+                relative: self.tolerance,
+            };
+            if !stages.implicit(field, time, &whole, x, &accuracy, next) {
                 return Attempt::Error(f64::INFINITY);
             }
             self.allow_moved(x, next);
