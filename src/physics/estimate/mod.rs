@@ -10,6 +10,7 @@ mod adequacy;
 mod determined;
 mod deviance;
 mod evaluate;
+mod free_run;
 mod observer;
 mod optimise;
 mod problem;
@@ -23,6 +24,9 @@ pub use problem::{EstimateError, PlantRecording};
 use nalgebra::DMatrix;
 
 use self::deviance::Deviance;
+use self::free_run::{
+    GLANCED_SAMPLES, coloured_fit, continue_free_run, fit_free_run, leaves_noise,
+};
 use self::optimise::{Effort, Range, minimise};
 use self::problem::Problem;
 use super::simulated::Simulated;
@@ -118,40 +122,10 @@ const ROUND: Effort = Effort {
     iterations: 20,
     settled: 1e-3,
 };
-/// Effort for a first look at a start.
-const GLANCE: Effort = Effort {
-    iterations: 6,
-    settled: 1.0,
-};
-/// The same where a run takes seconds.
-const COSTLY_GLANCE: Effort = Effort {
-    iterations: 2,
-    settled: 1.0,
-};
-/// Factors of the observer's gain on the way to free run, and the effort at each.
-const WEAKER: [f64; 10] = [0.6, 0.35, 0.2, 0.1, 0.05, 0.025, 0.012, 0.006, 0.003, 0.001];
-const CONTINUED: Effort = Effort {
-    iterations: 6,
-    settled: 0.1,
-};
-/// First part of the recordings that is fitted when it is made to grow, and the factor by which it grows.
-const GROWN_FROM: f64 = 0.05;
-const GROWTH: f64 = 1.3;
-/// Draws within the bounds are compared on the first samples of each recording; on short recordings there are more of them.
-const GLANCED_SAMPLES: usize = 1500;
-const GLANCED_VALUES: usize = 12_000;
-const LEAST_DRAWS: usize = 4;
-const MOST_DRAWS: usize = 10;
-/// Deviances that differ by less are those of one summit.
-const SAME_SUMMIT: f64 = 1.0;
-/// How many of them are searched to the end.
-const KEPT_DRAWS: usize = 3;
 /// A criterion that is larger than that of a rival by this is not improved further.
 const HOPELESS: f64 = 200.0;
 /// Part of each recording that the held-out fit is estimated from; the rest is judged.
 pub const HELD_OUT_FROM: f64 = 2.0 / 3.0;
-/// Level at which residuals are said to depend on the inputs.
-const NOISE: f64 = 1e-3;
 
 /// Estimates a plant, in equations or as an external simulator, from recordings of it. External simulators have no states that
 /// an observer could correct: they are estimated in free run.
@@ -176,10 +150,12 @@ pub fn estimate(
             // In free run the errors of such a plant grow: it comes second, from where the observer has led.
             let innovation = observer::fit(&problem, None);
             let free_run = match &innovation {
-                Some(fit) => improved_near(&problem, continue_free_run(&problem, fit), fit),
+                Some(fit) => continue_free_run(&problem, fit),
                 None => fit_free_run(&problem),
             };
-            (free_run, innovation)
+            // What looks like a gain of the observer then is one of its many summits where errors grow.
+            let noise = free_run.as_ref().is_some_and(|f| leaves_noise(&problem, f));
+            (free_run, innovation.filter(|_| !noise))
         }
         None => {
             let free_run = fit_free_run(&problem);
@@ -247,197 +223,6 @@ fn promising_innovation(problem: &Problem, free_run: Option<&Fit>) -> Option<Fit
         return None;
     }
     observer::fit(problem, Some(&first.point[..problem.nominal().len()]))
-}
-
-/// The fit in free run from the point of the innovation form, reached by weakening the observer in steps: with an observer the
-/// likelihood is nearly convex, in free run it may have many summits.
-fn continue_free_run(problem: &Problem, innovation: &Fit) -> Option<Fit> {
-    let numbers = problem.nominal().len();
-    let mut point = innovation.point.clone();
-    let mut ranges = problem.ranges();
-    for weaker in WEAKER {
-        for (gain, strong) in point[numbers..]
-            .iter_mut()
-            .zip(&innovation.point[numbers..])
-        {
-            *gain = weaker * strong;
-        }
-        ranges.truncate(numbers);
-        ranges.extend(point[numbers..].iter().map(|&gain| Range {
-            min: gain,
-            max: gain,
-            reach: 0.0,
-        }));
-        let mut objective =
-            Deviance::new(problem, Form::Innovation, Noise::unit(problem.outputs()));
-        objective.noise = objective.rescale(&point)?;
-        minimise(&mut objective, &mut point, &ranges, CONTINUED)?;
-    }
-    point.truncate(numbers);
-    white_fit(problem, &mut point, SEARCH)?;
-    coloured_fit(problem, point, innovation.criterion)
-}
-
-/// The better of a fit in free run and of one to growing parts of the recordings, where the innovation form is only a little
-/// better than the first: another summit of the free run may be the highest.
-fn improved_near(problem: &Problem, free_run: Option<Fit>, innovation: &Fit) -> Option<Fit> {
-    let ahead = free_run.as_ref()?.criterion - innovation.criterion;
-    if !(0.0..HOPELESS).contains(&ahead) {
-        return free_run;
-    }
-    let grown = grown_fit(problem)
-        .and_then(|(_, point)| coloured_fit(problem, point, innovation.criterion));
-    [free_run, grown]
-        .into_iter()
-        .flatten()
-        .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
-}
-
-/// The fit in free run from the values of the text and, unless that leaves white noise that does not depend on the inputs, from
-/// the values of the text less one term each, and from draws within the bounds. Summits are compared under white noise: a coloured noise model would absorb what a wrong one leaves.
-fn fit_free_run(problem: &Problem) -> Option<Fit> {
-    let mut point = problem.nominal();
-    let mut highest = white_fit(problem, &mut point, SEARCH).unwrap_or(f64::INFINITY);
-    let mut best = if highest.is_finite() {
-        coloured_fit(problem, point, f64::INFINITY)
-    } else {
-        None
-    };
-    if best.as_ref().is_some_and(|fit| leaves_noise(problem, fit)) {
-        return best;
-    }
-    if !problem.plant.costly()
-        && let Some((deviance, point)) = grown_fit(problem)
-        && deviance < highest - SAME_SUMMIT
-    {
-        highest = deviance;
-        best = coloured_fit(problem, point, f64::INFINITY).or(best);
-        if best.as_ref().is_some_and(|fit| leaves_noise(problem, fit)) {
-            return best;
-        }
-    }
-    // Draws are compared on the first part of the recordings.
-    let recordings = problem.parts(|samples| samples.min(GLANCED_SAMPLES));
-    let short = problem.with_recordings(&recordings);
-    let mut tried: Vec<(f64, Vec<f64>)> = Vec::new();
-    let draws = (GLANCED_VALUES / short.count().max(1)).clamp(LEAST_DRAWS, MOST_DRAWS);
-    let (draws, glance) = if problem.plant.costly() {
-        (LEAST_DRAWS, COSTLY_GLANCE)
-    } else {
-        (draws, GLANCE)
-    };
-    let draws = problem.draws(draws).into_iter().map(|d| (d, None));
-    for (mut point, held) in problem.without_terms().into_iter().chain(draws) {
-        if let Some(deviance) = white_fit_holding(&short, &mut point, glance, held) {
-            tried.push((deviance, point));
-        }
-    }
-    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for (_, mut point) in tried.into_iter().take(KEPT_DRAWS) {
-        let Some(deviance) = white_fit(problem, &mut point, SEARCH) else {
-            continue;
-        };
-        if deviance < highest - SAME_SUMMIT {
-            highest = deviance;
-            best = coloured_fit(problem, point, f64::INFINITY).or(best);
-        }
-    }
-    best
-}
-
-/// The fit under white noise to longer and longer first parts of the recordings, each from the one before, with its deviance. On
-/// a short part the likelihood has few summits; where small errors grow along a recording, a long one has many.
-fn grown_fit(problem: &Problem) -> Option<(f64, Vec<f64>)> {
-    let mut point = problem.nominal();
-    let mut part = GROWN_FROM;
-    while part < 1.0 {
-        let recordings = problem.parts(|samples| (part * samples as f64) as usize);
-        let short = problem.with_recordings(&recordings);
-        if short.count() > 2 * point.len() {
-            white_fit(&short, &mut point, CONTINUED)?;
-        }
-        part *= GROWTH;
-    }
-    let deviance = white_fit(problem, &mut point, SEARCH)?;
-    Some((deviance, point))
-}
-
-/// Whether the residuals of a fit are white and pass the tests. Coloured noise may hide what another summit explains.
-fn leaves_noise(problem: &Problem, fit: &Fit) -> bool {
-    if fit.noise.colours.iter().any(|c| c.len() > 0) {
-        return false;
-    }
-    let objective = Deviance::new(problem, Form::FreeRun, fit.noise.clone());
-    let (Some(residual), Some(simulated)) = (
-        objective.residual(&fit.point),
-        objective.simulated(&fit.point),
-    ) else {
-        return false;
-    };
-    let innovations = fit.noise.whiten(&residual, &problem.mask);
-    let tests = residual_tests(problem, fit, &innovations, &simulated);
-    let level = NOISE / tests.len().max(1) as f64;
-    tests
-        .iter()
-        .filter(|t| t.question != Question::White)
-        .all(|t| t.p_value > level)
-}
-
-/// Rounds of noise model and parameters from a point; given up where it cannot reach the criterion of a rival.
-fn coloured_fit(problem: &Problem, mut point: Vec<f64>, rival: f64) -> Option<Fit> {
-    let mut objective = Deviance::new(problem, Form::FreeRun, Noise::unit(problem.outputs()));
-    let mut last = f64::INFINITY;
-    for _ in 0..ROUNDS {
-        let residual = objective.residual(&point)?;
-        objective.noise = problem.noise(&residual);
-        let deviance = minimise(&mut objective, &mut point, &problem.ranges(), ROUND)?;
-        let now = problem.criterion(deviance, objective.noise.len(), 0);
-        if last - deviance < SETTLED || now > rival + HOPELESS {
-            last = deviance;
-            break;
-        }
-        last = deviance;
-    }
-    let criterion = problem.criterion(last, objective.noise.len(), 0);
-    Some(Fit {
-        form: Form::FreeRun,
-        point,
-        noise: objective.noise,
-        deviance: last,
-        criterion,
-    })
-}
-
-/// Improves a point under white noise whose size is that of what is left; gives the deviance with the size at the end.
-fn white_fit(problem: &Problem, point: &mut Vec<f64>, effort: Effort) -> Option<f64> {
-    white_fit_holding(problem, point, effort, None)
-}
-
-/// The same with one of the parameters held.
-fn white_fit_holding(
-    problem: &Problem,
-    point: &mut Vec<f64>,
-    effort: Effort,
-    held: Option<usize>,
-) -> Option<f64> {
-    let mut objective = Deviance::new(problem, Form::FreeRun, Noise::unit(problem.outputs()));
-    let mut ranges = problem.ranges();
-    if let Some(i) = held {
-        ranges[i] = Range {
-            min: point[i],
-            max: point[i],
-            reach: 0.0,
-        };
-    }
-    for _ in 0..2 {
-        objective.noise = objective.rescale(point)?;
-        minimise(&mut objective, point, &ranges, effort)?;
-    }
-    let residual = objective.residual(point)?;
-    Some(
-        Noise::white(&residual, problem.outputs(), &problem.mask)
-            .deviance(&residual, &problem.mask),
-    )
 }
 
 fn finish(problem: &Problem, fit: Fit, other_criterion: Option<f64>) -> PlantEstimate {
