@@ -30,7 +30,7 @@ const GROWTH: f64 = 1.3;
 pub(super) const GLANCED_SAMPLES: usize = 1500;
 const GLANCED_VALUES: usize = 12_000;
 const LEAST_DRAWS: usize = 4;
-const MOST_DRAWS: usize = 10;
+const MOST_DRAWS: usize = 16;
 /// Deviances that differ by less are those of one summit.
 const SAME_SUMMIT: f64 = 1.0;
 /// How many of them are searched to the end.

@@ -27,7 +27,7 @@ use self::deviance::Deviance;
 use self::free_run::{
     GLANCED_SAMPLES, coloured_fit, continue_free_run, fit_free_run, leaves_noise,
 };
-use self::optimise::{Effort, Range, minimise};
+use self::optimise::Effort;
 use self::problem::Problem;
 use super::simulated::Simulated;
 use super::simulation::{Hold, Point};

@@ -15,6 +15,8 @@ mod plant;
 mod step;
 mod step_control;
 mod tape;
+#[cfg(test)]
+mod tests;
 
 pub use linearise::LinearPlant;
 pub use plant::{

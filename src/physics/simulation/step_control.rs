@@ -24,6 +24,9 @@ const MOST_DOUBLED: u8 = 4;
 const EMBEDDED: f64 = 10.0;
 /// A step whose halves agree to this part of what is allowed says how far they need not be computed.
 const TRUSTED: f64 = 0.5;
+/// No larger difference, as a multiple of the error that is allowed, is trusted: across a switch two half steps may agree with
+/// a step by chance, and what follows would slide over it in steps that are not stable.
+const MOST_TRUSTED: f64 = 100.0;
 /// A state that hardly moves about a large value is computed to this part of [`STEP_ACCURACY`] of that value.
 const OF_LEVEL: f64 = 1e-5;
 /// Error of a step from rest, as a part of the step: what starts to move has no scale yet.
@@ -374,7 +377,7 @@ impl<'p> StepControl<'p> {
                 }
                 let error = worst(&self.error, &self.allowed);
                 self.trusted = match error {
-                    e if e <= TRUSTED => indication,
+                    e if e <= TRUSTED => indication.min(MOST_TRUSTED),
                     e if e <= 1.0 => self.trusted,
                     _ => self.trusted.min(0.5 * indication),
                 };
@@ -384,6 +387,7 @@ impl<'p> StepControl<'p> {
             }
         };
         if error <= 1.0 && !self.rough && self.passes_a_switch(&integrator.field) {
+            self.trusted = 0.0;
             return Attempt::Switch;
         }
         Attempt::Error(error)

@@ -1,0 +1,44 @@
+//! Steps at the accuracy of a search, where what is not resolved shows in the sensitivities first.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{Direction, Excitation, Hold, Plant};
+use crate::physics::parse;
+
+#[test]
+fn sensitivities_stay_bounded_where_friction_holds() {
+    let text = "model M parameter Real J = 0.02; parameter Real d = 0.05; parameter Real c = 0.3; input Real u; output Real y;
+         Real w(start=0); equation J*der(w) = u - d*w - c*sign(w); y = w; end M;";
+    let plant = Plant::new(parse(text).expect("a plant")).with_accuracy(1e-7);
+    let directions: Vec<Direction> = (0..3).map(Direction::Parameter).collect();
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    for draw in 0..200 {
+        // Pushes beyond the friction and below it, a little different at each sample: it slides, slows down, and is held.
+        let mut push = 0.0;
+        let u: Vec<f64> = (0..600)
+            .map(|k| {
+                if k % 20 == 0 {
+                    push = 1.4 * random.random::<f64>() - 0.7;
+                }
+                push + 0.1 * (random.random::<f64>() - 0.5)
+            })
+            .collect();
+        let excitation = Excitation {
+            inputs: &[&u],
+            length: u.len(),
+            sample_time: 0.02,
+            start_time: 0.0,
+            hold: Hold::Zero,
+        };
+        let point = plant.nominal();
+        let run = plant.simulate(&point, &excitation, None).expect("a run");
+        let slopes = plant.sensitivities(&point, &excitation, None, &run.plan, &directions);
+        let largest = slopes[0]
+            .iter()
+            .flatten()
+            .fold(0.0f64, |m, s| m.max(s.abs()));
+        // A push of 0.7 on J for one time constant J/d: dw/dJ stays below 0.7/d/J.
+        assert!(largest < 0.7 / 0.05 / 0.02, "draw {draw}: {largest:e}");
+    }
+}
