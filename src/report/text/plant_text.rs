@@ -1,7 +1,7 @@
 //! A plant in equations, for people: what was read, and what was estimated.
 
 use super::number::{percent, significant, with_std};
-use super::plant_validation_text::{initial_state_text, residual_test_table};
+use super::plant_validation_text::{initial_state_text, residual_test_table, tests_fail};
 use super::table::Table;
 use super::{Style, wrapped};
 use crate::physics::{ModelSpec, Plant, Unknown, Variable, VariableKind, unit_conflicts};
@@ -362,6 +362,11 @@ pub(crate) fn verdict(document: &PlantDocument, title: &str) -> String {
         "{title}: {count} parameter{s} estimated {form}; {}",
         out.join("; ")
     )
+}
+
+/// Whether the equations leave something out: a test of the residuals fails, or a linear model follows clearly better.
+pub(crate) fn leaves_something_out(document: &PlantDocument) -> bool {
+    tests_fail(&document.residual_tests) || better_linear_model(document).is_some()
 }
 
 /// How many times the free run's error is larger than the one-step error.

@@ -12,8 +12,8 @@ use crate::physics::estimate::{Evaluation, PlantRecording};
 use crate::report::PlantDocument;
 use crate::report::text;
 use crate::report::text::{
-    Style, initial_state_table, parameter_table, percent, plant_verdict, residual_test_table,
-    tests_fail,
+    Style, initial_state_table, leaves_something_out, parameter_table, percent, plant_verdict,
+    residual_test_table,
 };
 
 /// Correlations from this size on mean that hardly more than a combination of the two is known.
@@ -58,7 +58,7 @@ pub(super) fn view(
     let sentence = plant_verdict(document, &format!("{} from {samples} samples", spec.name));
     let (about, headline) = sentence.split_once(": ").unwrap_or(("", &sentence));
     let (kind, class) = match (
-        tests_fail(&document.residual_tests),
+        leaves_something_out(document),
         document.undetermined.is_empty(),
     ) {
         (true, _) => ("Doubtful", "is-doubtful"),
