@@ -157,14 +157,20 @@ fn intervals_hold_the_truth() {
             kind.name,
             100.0 * share
         );
-        // Six standard deviations of a binomial for the few of the ordinary run; what the README says for many.
-        let slack = if asked.is_some() {
-            0.03
+        // Six standard deviations of a binomial for the few of the ordinary run. Many hold 92 to 98 %, and their errors are
+        // within 10 % of the bound of Cramer and Rao, which the stated deviations are.
+        let (share_range, rms_range) = if asked.is_some_and(|runs| runs >= 200) {
+            (0.92..=0.98, 0.9..=1.1)
         } else {
-            6.0 * (0.95 * 0.05 / total as f64).sqrt()
+            let slack = 6.0 * (0.95 * 0.05 / total as f64).sqrt();
+            (0.95 - slack..=1.0, 0.6..=1.6)
         };
-        assert!(share > 0.95 - slack, "{}: {held} of {total}", kind.name);
-        assert!((0.6..1.6).contains(&rms), "{}: {rms}", kind.name);
+        assert!(
+            share_range.contains(&share),
+            "{}: {held} of {total}",
+            kind.name
+        );
+        assert!(rms_range.contains(&rms), "{}: {rms}", kind.name);
     }
 }
 
