@@ -273,7 +273,8 @@ impl<const M: usize> Propagator<M> {
                 *c = after.plus(-1.0, before);
             }
         }
-        let n = x.len();
+        // A plant without states has rows of none.
+        let n = x.len().max(1);
         for (x, row) in x.iter_mut().zip(self.held.chunks(n)) {
             *x = product(*x, row, rate);
         }

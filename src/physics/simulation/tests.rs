@@ -42,3 +42,23 @@ fn sensitivities_stay_bounded_where_friction_holds() {
         assert!(largest < 0.7 / 0.05 / 0.02, "draw {draw}: {largest:e}");
     }
 }
+
+#[test]
+fn a_plant_without_states_is_simulated() {
+    let text =
+        "model G parameter Real k = 2; input Real u; output Real y; equation y = k*u; end G;";
+    let plant = Plant::new(parse(text).expect("a plant"));
+    for hold in [Hold::Zero, Hold::Linear] {
+        let excitation = Excitation {
+            inputs: &[&[1.0, -0.5, 3.0]],
+            length: 3,
+            sample_time: 0.1,
+            start_time: 0.0,
+            hold,
+        };
+        let run = plant
+            .simulate(&plant.nominal(), &excitation, None)
+            .expect("a run");
+        assert_eq!(run.outputs, [[2.0, -1.0, 6.0]]);
+    }
+}
