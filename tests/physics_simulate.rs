@@ -335,7 +335,7 @@ fn what_has_no_value_is_said_with_time_expression_and_values() {
     let error = unstable
         .simulate(
             &unstable.nominal(),
-            &excitation(&[], 100, 0.1, Hold::Zero),
+            &excitation(&[], 200, 0.1, Hold::Zero),
             None,
         )
         .unwrap_err();

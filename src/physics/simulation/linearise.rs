@@ -145,7 +145,6 @@ impl Plant {
             {
                 return None;
             }
-            let size = x.iter().map(|x| x.abs()).fold(1.0, f64::max);
             let right = nalgebra::DVector::from_vec(linear.derivative.clone());
             let sound = |v: &f64| v.abs() < LARGEST;
             if !linear.a.iter().all(sound) || !right.iter().all(sound) {
@@ -157,9 +156,28 @@ impl Plant {
                 return None;
             }
             x.iter_mut().zip(step.iter()).for_each(|(x, s)| *x -= s);
-            if step.amax() <= 1e-12 * size {
-                let left = self.linearise(point, &x, inputs, 0.0).derivative;
-                return left.iter().all(|d| d.abs() <= 1e-8 * size).then_some(x);
+            // Each state on its own scale: beside a pressure in Pa no temperature would ever move.
+            let size: Vec<f64> = x
+                .iter()
+                .zip(state)
+                .map(|(x, s)| x.abs().max(s.abs()).max(1.0))
+                .collect();
+            if step
+                .iter()
+                .zip(&size)
+                .all(|(s, size)| s.abs() <= 1e-10 * size)
+            {
+                let end = self.linearise(point, &x, inputs, 0.0);
+                let at_rest = |(i, d): (usize, &f64)| {
+                    let row = end.a.row(i);
+                    let scale: f64 = row
+                        .iter()
+                        .zip(&size)
+                        .map(|(a, size)| (a * size).abs())
+                        .sum();
+                    d.abs() <= 1e-8 * scale
+                };
+                return end.derivative.iter().enumerate().all(at_rest).then_some(x);
             }
         }
         None

@@ -190,8 +190,8 @@ fn said(values: &[(String, f64)]) -> String {
     format!("; there {}", list.join(", "))
 }
 
-/// A run that leaves this has diverged.
-const DIVERGED: f64 = 1e9;
+/// A state that grows to as many times its start (at least 1) has diverged. A pressure in Pa or an energy in J comes nowhere near.
+const DIVERGED: f64 = 1e15;
 
 /// A plant that can be simulated.
 #[derive(Debug, Clone)]
@@ -393,6 +393,9 @@ impl Plant {
         let column = || Vec::with_capacity(excitation.length);
         let mut outputs: Vec<Vec<f64>> = self.tape.outputs.iter().map(|_| column()).collect();
         let mut states: Vec<Vec<f64>> = self.tape.states.iter().map(|_| column()).collect();
+        let limits: Vec<f64> = (integrator.x.iter())
+            .map(|x| DIVERGED * x.value.abs().max(1.0))
+            .collect();
         for k in 0..excitation.length {
             integrator.sample(k, excitation);
             for (column, x) in states.iter_mut().zip(&integrator.x) {
@@ -411,7 +414,7 @@ impl Plant {
                 if !integrator.propagate(k, excitation) {
                     control.advance(&mut integrator, k, excitation)?;
                 }
-                self.bounded(&integrator, excitation.time(k + 1))?;
+                self.bounded(&integrator, &limits, excitation.time(k + 1))?;
             }
         }
         Ok(Trajectory {
@@ -421,10 +424,15 @@ impl Plant {
         })
     }
 
-    /// Whether the states are within every bound.
-    fn bounded(&self, integrator: &Integrator<0>, time: f64) -> Result<(), SimulationError> {
-        let beyond = |x: f64| x.is_nan() || x.abs() >= DIVERGED;
-        match integrator.x.iter().position(|x| beyond(x.value)) {
+    /// Whether no state has diverged.
+    fn bounded(
+        &self,
+        integrator: &Integrator<0>,
+        limits: &[f64],
+        time: f64,
+    ) -> Result<(), SimulationError> {
+        let mut states = integrator.x.iter().zip(limits);
+        match states.position(|(x, &limit)| x.value.is_nan() || x.value.abs() >= limit) {
             Some(i) => Err(self.diverged(integrator, time, i)),
             None => Ok(()),
         }

@@ -62,3 +62,30 @@ fn a_plant_without_states_is_simulated() {
         assert_eq!(run.outputs, [[2.0, -1.0, 6.0]]);
     }
 }
+
+#[test]
+fn states_of_any_size_are_no_divergence_and_have_scales_of_their_own() {
+    let text = "model E parameter Real q = 0.5; input Real u; output Real T(start=40); output Real p(start=3e9);
+         equation der(T) = u*(20 - T) + q; der(p) = 0.02*(2e9 - p) + 4e7*u; end E;";
+    let plant = Plant::new(parse(text).expect("a plant"));
+    let (point, start) = (plant.nominal(), [40.0, 3e9]);
+    // Without flow the temperature rises for ever, however slowly beside the pressure.
+    assert_eq!(plant.equilibrium(&point, &start, &[0.0]), None);
+    let rest = plant
+        .equilibrium(&point, &start, &[0.5])
+        .expect("an equilibrium");
+    assert!(
+        (rest[0] - 21.0).abs() < 1e-6 && (rest[1] - 3e9).abs() < 1.0,
+        "{rest:?}"
+    );
+    let inputs = [0.5; 400];
+    let excitation = Excitation {
+        inputs: &[&inputs],
+        length: 400,
+        sample_time: 2.0,
+        start_time: 0.0,
+        hold: Hold::Zero,
+    };
+    let run = plant.simulate(&point, &excitation, None).expect("a run");
+    assert!((run.outputs[0][399] - 21.0).abs() < 1e-6);
+}
