@@ -4,7 +4,13 @@ use clap::{Args, ValueEnum};
 
 use super::Outcome;
 use super::output::print;
-use crate::report::{explanation_schema, model_schema, plant_schema, reproduction_schema};
+use crate::explain::Explanation;
+use crate::report::{
+    LinearisationDocument, ModelDocument, PlantDocument, PlantValidation, ValidationDocument,
+    schema,
+};
+use crate::reproduce::Reproduction;
+use crate::validate::Validation;
 
 const EXAMPLE: &str = "Example:
   innovant schema model > innovant-model-1.schema.json";
@@ -25,16 +31,25 @@ enum Document {
     Explanation,
     /// innovant-plant/1, what `innovant identify --structure` writes
     Plant,
+    /// innovant-validation/1, what `innovant validate MODEL --format json` prints
+    Validation,
+    /// innovant-plant-validation/1, what it prints of a plant in equations
+    PlantValidation,
+    /// innovant-linearisation/1, what `innovant show PLANT --format json` prints
+    Linearisation,
     /// innovant-reproduction/1, what `innovant reproduce` writes
     Reproduction,
 }
 
 pub(super) fn run(flags: &Flags) -> anyhow::Result<Outcome> {
-    match flags.document {
-        Document::Model => print(&model_schema()?)?,
-        Document::Explanation => print(&explanation_schema()?)?,
-        Document::Plant => print(&plant_schema()?)?,
-        Document::Reproduction => print(&reproduction_schema()?)?,
-    }
+    print(&match flags.document {
+        Document::Model => schema::<ModelDocument>(),
+        Document::Explanation => schema::<Explanation>(),
+        Document::Plant => schema::<PlantDocument>(),
+        Document::Validation => schema::<ValidationDocument<Validation>>(),
+        Document::PlantValidation => schema::<ValidationDocument<PlantValidation>>(),
+        Document::Linearisation => schema::<LinearisationDocument>(),
+        Document::Reproduction => schema::<Reproduction>(),
+    }?)?;
     Ok(Outcome::Done)
 }

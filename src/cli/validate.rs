@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use serde::Serialize;
 
 use super::numbers;
 use super::output::{check_distinct, print};
@@ -16,7 +15,10 @@ use crate::log::{Log, Reading, RoleNeed, Source, check_same_sampling};
 use crate::moments::Detrend;
 use crate::physics::estimate::PlantRecording;
 use crate::report::text::{plant_validation_text, validation_text};
-use crate::report::{judge_plant, read_model, text_alone, to_json};
+use crate::report::{
+    PLANT_VALIDATION_FORMAT, VALIDATION_FORMAT, ValidationDocument, judge_plant, read_model,
+    text_alone, to_json,
+};
 use crate::validate::{Deviations, Relation, Zero, judge};
 
 const EXAMPLE: &str = "Examples:
@@ -70,16 +72,6 @@ enum Format {
     Text,
     /// A document
     Json,
-}
-
-/// The result as a document.
-#[derive(Serialize)]
-struct ValidationDocument<'a, V> {
-    format: &'static str,
-    model: String,
-    recordings: Vec<Recording>,
-    #[serde(flatten)]
-    validation: &'a V,
 }
 
 pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
@@ -140,7 +132,7 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     })?;
     match flags.format {
         Format::Json => print(&to_json(&ValidationDocument {
-            format: "innovant-validation/1",
+            format: VALIDATION_FORMAT,
             model: flags.model.display().to_string(),
             recordings,
             validation: &tests,
@@ -178,7 +170,7 @@ fn validate_plant(flags: &Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         .map_err(|e| anyhow::anyhow!("{name}: {e}"))?;
     match flags.format {
         Format::Json => print(&to_json(&ValidationDocument {
-            format: "innovant-plant-validation/1",
+            format: PLANT_VALIDATION_FORMAT,
             model: name,
             recordings,
             validation: &found,

@@ -15,6 +15,7 @@
 //! | `simulator_document` | the external simulator in it                                 |
 //! | `plant_linearisation` | a plant at an operating point: poles, gains, responses      |
 //! | `plant_validation` | the judgement of a plant on recordings                        |
+//! | `validation_document` | what `validate` writes                                      |
 //! | `reproduction_csv` | all numbers of a reproduction as one long table                 |
 //!
 //! # The same input gives the same bytes
@@ -45,6 +46,7 @@ mod request;
 mod schema;
 mod simulator_document;
 pub mod text;
+mod validation_document;
 
 pub use channels::{InputDocument, OutputDocument};
 pub use error::DocumentError;
@@ -76,5 +78,6 @@ pub use read::{ReadModel, parse_model, read_model};
 pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
 pub use reproduction_csv::reproduction_csv;
 pub use request::Request;
-pub use schema::{explanation_schema, model_schema, plant_schema, reproduction_schema};
+pub use schema::schema;
 pub use simulator_document::SimulatorDocument;
+pub use validation_document::{PLANT_VALIDATION_FORMAT, VALIDATION_FORMAT, ValidationDocument};

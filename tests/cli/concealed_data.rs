@@ -8,7 +8,7 @@ use innovant::explain::{
     ExplainError, Explanation, FitFigure, Options, Simulation, Verdict, explain,
 };
 use innovant::log::{Log, RoleNeed, Roles, Source};
-use innovant::report::{explanation_schema, parse_explanation};
+use innovant::report::{parse_explanation, schema};
 use rayon::prelude::*;
 use serde_json::Value;
 
@@ -229,7 +229,8 @@ fn round_trip(case: &str, data: &Path, scratch: &Folder, explanation: &Explanati
 
 #[test]
 fn concealed_cases_are_answered() {
-    let schema: Value = serde_json::from_str(&explanation_schema().unwrap()).unwrap();
+    let schema: Value =
+        serde_json::from_str(&schema::<innovant::explain::Explanation>().unwrap()).unwrap();
     let printed: Value = Folder::new().run(&["schema", "explanation"]).json();
     assert_eq!(schema, printed);
     let validator = jsonschema::draft202012::new(&schema).unwrap();

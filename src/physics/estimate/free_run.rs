@@ -1,5 +1,7 @@
 //! The fit in free run. Its likelihood may have many summits: several ways lead to the highest.
 
+use rayon::prelude::*;
+
 use super::adequacy::Question;
 use super::deviance::Deviance;
 use super::optimise::{Effort, Range, minimise};
@@ -94,7 +96,6 @@ pub(super) fn fit_free_run(problem: &Problem) -> Option<Fit> {
     // Draws are compared on the first part of the recordings.
     let recordings = problem.parts(|samples| samples.min(GLANCED_SAMPLES));
     let short = problem.with_recordings(&recordings);
-    let mut tried: Vec<(f64, Vec<f64>)> = Vec::new();
     let draws = (GLANCED_VALUES / short.count().max(1)).clamp(LEAST_DRAWS, MOST_DRAWS);
     let (draws, glance) = if problem.plant.costly() {
         (LEAST_DRAWS, COSTLY_GLANCE)
@@ -102,16 +103,21 @@ pub(super) fn fit_free_run(problem: &Problem) -> Option<Fit> {
         (draws, GLANCE)
     };
     let draws = problem.draws(draws).into_iter().map(|d| (d, None));
-    for (mut point, held) in problem.without_terms().into_iter().chain(draws) {
-        if let Some(deviance) = white_fit_holding(&short, &mut point, glance, held) {
-            tried.push((deviance, point));
-        }
-    }
+    let starts: Vec<_> = problem.without_terms().into_iter().chain(draws).collect();
+    let mut tried: Vec<(f64, Vec<f64>)> = starts
+        .into_par_iter()
+        .filter_map(|(mut point, held)| {
+            let deviance = white_fit_holding(&short, &mut point, glance, held)?;
+            Some((deviance, point))
+        })
+        .collect();
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for (_, mut point) in tried.into_iter().take(KEPT_DRAWS) {
-        let Some(deviance) = white_fit(problem, &mut point, SEARCH) else {
-            continue;
-        };
+    tried.truncate(KEPT_DRAWS);
+    let searched: Vec<(f64, Vec<f64>)> = tried
+        .into_par_iter()
+        .filter_map(|(_, mut point)| Some((white_fit(problem, &mut point, SEARCH)?, point)))
+        .collect();
+    for (deviance, point) in searched {
         if deviance < highest - SAME_SUMMIT {
             highest = deviance;
             best = coloured_fit(problem, point, f64::INFINITY).or(best);
@@ -152,9 +158,11 @@ pub(super) fn leaves_noise(problem: &Problem, fit: &Fit) -> bool {
     let innovations = fit.noise.whiten(&residual, &problem.mask);
     let tests = residual_tests(problem, fit, &innovations, &simulated);
     let level = NOISE / tests.len().max(1) as f64;
+    // A noise model without colour was found white already, unless no other was asked for.
+    let chosen = !problem.least_squares();
     tests
         .iter()
-        .filter(|t| t.question != Question::White)
+        .filter(|t| !(chosen && t.question == Question::White))
         .all(|t| t.p_value > level)
 }
 

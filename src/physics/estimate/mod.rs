@@ -22,6 +22,7 @@ pub use evaluate::{Evaluation, Held, HeldNoise, evaluate};
 pub use problem::{EstimateError, PlantRecording};
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use self::deviance::Deviance;
 use self::free_run::{
@@ -226,29 +227,24 @@ fn promising_innovation(problem: &Problem, free_run: Option<&Fit>) -> Option<Fit
 }
 
 fn finish(problem: &Problem, fit: Fit, other_criterion: Option<f64>) -> PlantEstimate {
-    let mut objective = match fit.form {
-        Form::FreeRun => Deviance::new(problem, Form::FreeRun, fit.noise.clone()),
-        Form::Innovation => Deviance::new(problem, Form::Innovation, fit.noise.clone()),
-    };
+    let mut objective = Deviance::new(problem, fit.form, fit.noise.clone());
     let covariances = objective.covariances(&fit.point);
     let covariance = &covariances.joint;
     let free = problem.free.clone();
     let undetermined = determined::undetermined(problem, &fit.point, covariance);
     let ranges = problem.ranges();
     let parameters = free
-        .iter()
+        .par_iter()
         .enumerate()
         .map(|(i, &index)| {
-            let std = covariance[(i, i)].max(0.0).sqrt();
+            let mut objective = Deviance::new(problem, fit.form, fit.noise.clone());
             let value = fit.point[i];
-            let at_bound = value <= ranges[i].min || value >= ranges[i].max;
-            let interval = profile::interval(&mut objective, problem, &fit, &covariances, i);
             EstimatedParameter {
                 index,
                 value,
-                std,
-                interval,
-                at_bound,
+                std: covariance[(i, i)].max(0.0).sqrt(),
+                interval: profile::interval(&mut objective, problem, &fit, &covariances, i),
+                at_bound: value <= ranges[i].min || value >= ranges[i].max,
             }
         })
         .collect();

@@ -354,9 +354,14 @@ impl<'a> Problem<'a> {
             .collect()
     }
 
+    /// Whether noise is taken as white, whatever is left.
+    pub fn least_squares(&self) -> bool {
+        self.options.least_squares
+    }
+
     /// Noise model of what a free run leaves: white and Gaussian for least squares, else estimated.
     pub fn noise(&self, residual: &Series) -> Noise {
-        if self.options.least_squares {
+        if self.least_squares() {
             Noise::white(residual, self.outputs(), &self.mask)
         } else {
             Noise::estimate(residual, self.outputs(), &self.mask, Colours::All)

@@ -165,6 +165,18 @@ pub enum SimulationError {
         /// Its value.
         value: f64,
     },
+    /// The plant needs far more steps than samples.
+    #[error(
+        "at t = {time:.6} s the simulation has taken {steps} steps for {samples} samples: with these values the equations are far faster than the sampling"
+    )]
+    TooFast {
+        /// When.
+        time: f64,
+        /// Steps so far.
+        steps: usize,
+        /// Samples so far.
+        samples: usize,
+    },
     /// The excitation is not that of the plant.
     #[error(
         "the plant has {expected} inputs of {length} samples each; {found} columns were given, or columns of another length"
@@ -192,6 +204,13 @@ fn said(values: &[(String, f64)]) -> String {
 
 /// A state that grows to as many times its start (at least 1) has diverged. A pressure in Pa or an energy in J comes nowhere near.
 const DIVERGED: f64 = 1e15;
+
+/// A simulation may take so many steps a sample on average, and always this many: some seconds of computing.
+const MOST_STEPS_A_SAMPLE: usize = 1000;
+const MOST_STEPS: usize = 2_000_000;
+/// One that is repeated with other values may take so many steps a sample, and so many times those of the first.
+const MOST_REPEATED_A_SAMPLE: usize = 100;
+const MOST_REPEATED: usize = 10;
 
 /// A plant that can be simulated.
 #[derive(Debug, Clone)]
@@ -285,16 +304,19 @@ impl Plant {
         excitation: &Excitation,
         observer: Option<&Observer>,
     ) -> Result<Trajectory, SimulationError> {
+        let most = MOST_STEPS.max(MOST_STEPS_A_SAMPLE * excitation.length);
         let moving = self.tape.switches.iter().any(|s| s.moves);
         if !moving {
-            return self.run_choosing(point, excitation, observer, Some(&[]));
+            return self.run_choosing(point, excitation, observer, Some(&[]), most);
         }
         // A first run only finds how large the arguments of switches become.
-        let rough = self.run_choosing(point, excitation, observer, None)?;
-        self.run_choosing(point, excitation, observer, Some(&rough.plan.widths))
+        let rough = self.run_choosing(point, excitation, observer, None, most)?;
+        let widths = Some(rough.plan.widths.as_slice());
+        self.run_choosing(point, excitation, observer, widths, most)
     }
 
-    /// As [`simulate`](Self::simulate) with the ramps of an earlier run: the answer is then smooth in the parameters.
+    /// As [`simulate`](Self::simulate) with the ramps of an earlier run: the answer is then smooth in the parameters. Values that
+    /// need far more steps than that run are refused.
     ///
     /// # Errors
     /// As `simulate`.
@@ -305,7 +327,8 @@ impl Plant {
         observer: Option<&Observer>,
         plan: &Plan,
     ) -> Result<Trajectory, SimulationError> {
-        self.run_choosing(point, excitation, observer, Some(&plan.widths))
+        let most = (MOST_REPEATED_A_SAMPLE * excitation.length).max(MOST_REPEATED * plan.steps());
+        self.run_choosing(point, excitation, observer, Some(&plan.widths), most)
     }
 
     fn check(&self, excitation: &Excitation) -> Result<(), SimulationError> {
@@ -386,10 +409,11 @@ impl Plant {
         excitation: &Excitation,
         observer: Option<&Observer>,
         widths: Option<&[f64]>,
+        most_steps: usize,
     ) -> Result<Trajectory, SimulationError> {
         self.check(excitation)?;
         let mut integrator = self.integrator::<0>(point, excitation, widths.unwrap_or(&[]), &[]);
-        let mut control = StepControl::new(self, &integrator, widths.is_none());
+        let mut control = StepControl::new(self, &integrator, widths.is_none(), most_steps);
         let column = || Vec::with_capacity(excitation.length);
         let mut outputs: Vec<Vec<f64>> = self.tape.outputs.iter().map(|_| column()).collect();
         let mut states: Vec<Vec<f64>> = self.tape.states.iter().map(|_| column()).collect();

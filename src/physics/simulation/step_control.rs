@@ -52,6 +52,9 @@ const RAMP_STEP: f64 = 0.5;
 pub(super) struct StepControl<'p> {
     plant: &'p Plant,
     steps: Vec<u8>,
+    /// Attempts so far, and how many there may be.
+    attempts: usize,
+    most_attempts: usize,
     depth: u8,
     implicit: bool,
     /// Samples in which the implicit method was used.
@@ -113,12 +116,19 @@ enum Attempt {
 }
 
 impl<'p> StepControl<'p> {
-    pub fn new(plant: &'p Plant, integrator: &Integrator<0>, rough: bool) -> Self {
+    pub fn new(
+        plant: &'p Plant,
+        integrator: &Integrator<0>,
+        rough: bool,
+        most_attempts: usize,
+    ) -> Self {
         let n = integrator.x.len();
         let room = vec![Dual::constant(0.0); n];
         Self {
             plant,
             steps: Vec::new(),
+            attempts: 0,
+            most_attempts,
             depth: 0,
             implicit: false,
             stiff_samples: 0,
@@ -202,6 +212,13 @@ impl<'p> StepControl<'p> {
         for (start, length) in &parts {
             integrator.begin_part(start, length, k, excitation, parts.len() == 1);
             self.part(integrator, start, length)?;
+            if self.attempts > self.most_attempts {
+                return Err(SimulationError::TooFast {
+                    time: start.value,
+                    steps: self.attempts,
+                    samples: k + 1,
+                });
+            }
         }
         Ok(())
     }
@@ -262,6 +279,7 @@ impl<'p> StepControl<'p> {
             let time = start.plus(share(place), length);
             let step = share(size) * length.value;
             let attempt = self.attempt(integrator, &time, step, depth);
+            self.attempts += 1;
             let accepted = matches!(attempt, Attempt::Error(e) if e <= 1.0);
             if !accepted && depth < finest {
                 depth += 1;
