@@ -358,6 +358,28 @@ fn linearisation_and_equilibrium() {
     assert!((linear.b[(1, 0)] - 1.0 / inertia).abs() < 1e-9);
 }
 
+#[test]
+fn a_run_that_needs_far_more_steps_than_another_is_given_up() {
+    let plant = plant(
+        "model Spring parameter Real k = 1; output Real x(start=1); Real v; equation der(x) = v; der(v) = -k*x^3; end Spring;",
+    );
+    let excitation = excitation(&[], 100, 0.1, Hold::Zero);
+    let mut point = plant.nominal();
+    let soft = plant.simulate(&point, &excitation, None).unwrap();
+    point.parameters[0] = 100.0;
+    plant
+        .simulate_as(&point, &excitation, None, &soft.plan)
+        .unwrap();
+    point.parameters[0] = 1e16;
+    let error = plant
+        .simulate_as(&point, &excitation, None, &soft.plan)
+        .unwrap_err();
+    let SimulationError::TooFast { steps, samples, .. } = error else {
+        panic!("{error}")
+    };
+    assert!(steps >= 10_000 && samples == 1, "{error}");
+}
+
 fn shared() -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/physics/dev");
     path.is_dir().then_some(path)

@@ -3,7 +3,7 @@
 use innovant::log::Log;
 use innovant::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate, evaluate};
 use innovant::physics::{
-    Excitation, Hold, OperatingPoint, Plant as Core, Point, VariableId, check_units, parse,
+    Excitation, Hold, OperatingPoint, Plant as Core, Point, VariableId, diagnose, render_all,
 };
 use innovant::report::text::{Style, plant_estimate_text, plant_text};
 use innovant::report::{
@@ -98,8 +98,7 @@ impl Plant {
                 document: Some(document),
             });
         }
-        let spec = parse(text).map_err(|e| raise(e.render(name, text)))?;
-        check_units(&spec).map_err(|e| raise(e.render(name, text)))?;
+        let spec = diagnose(text).map_err(|errors| raise(render_all(&errors, name, text)))?;
         let core = Core::new(spec);
         Ok(Self {
             point: core.nominal(),

@@ -92,6 +92,7 @@ def test_two_recordings_are_better_than_one():
     ("make", "words"),
     [
         (lambda: innovant.Plant(TEXT.replace("sin(phi)", "sin(phy)")), "did you mean"),
+        (lambda: innovant.Plant(TEXT.replace("sin(phi)", "sin(phy)").replace("der(phi) = w", "der(phi) = v")), "2 errors"),
         (lambda: innovant.Plant(TEXT).simulate(np.ones((5, 2)), dt=0.1), "samples x 1"),
         (lambda: innovant.Plant(TEXT).simulate(np.ones(5), dt=0.1, parameters={"M": 1.0}), "no parameter `M`"),
         (lambda: innovant.Plant(TEXT).fit(np.ones(500), np.ones(500), dt=0.1, fix=["q"]), "no parameter `q`"),

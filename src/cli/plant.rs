@@ -10,7 +10,7 @@ use super::roles::{RoleFlags, tell_reading};
 use crate::identify::{IdentifiedChannel, Recording};
 use crate::log::{Channel, Log, LogError, Reading, RoleNeed, Roles, Source};
 use crate::physics::estimate::PlantRecording;
-use crate::physics::{Hold, Plant, Point, SpecError, VariableId, diagnose, unknown_units};
+use crate::physics::{Hold, Plant, Point, VariableId, diagnose, render_all, unknown_units};
 use crate::report::{PlantDocument, is_plant};
 
 /// A plant from a file.
@@ -65,8 +65,8 @@ pub(super) fn load(path: &Path) -> anyhow::Result<LoadedPlant> {
             warnings: vec![],
         });
     }
-    let spec =
-        diagnose(&text).map_err(|errors| anyhow::anyhow!("{}", rendered(&errors, &name, &text)))?;
+    let spec = diagnose(&text)
+        .map_err(|errors| anyhow::anyhow!("{}", render_all(&errors, &name, &text)))?;
     let unknown = unknown_units(&spec).into_iter();
     let warnings = unknown
         .map(|u| format!("{name}:{}:{}: {u}", u.line, u.column))
@@ -80,15 +80,6 @@ pub(super) fn load(path: &Path) -> anyhow::Result<LoadedPlant> {
         document: None,
         warnings,
     })
-}
-
-/// Errors one below the other, and how many they are.
-fn rendered(errors: &[SpecError], name: &str, text: &str) -> String {
-    let mut lines: Vec<String> = errors.iter().map(|e| e.render(name, text)).collect();
-    if errors.len() > 1 {
-        lines.push(format!("{} errors", errors.len()));
-    }
-    lines.join("\n")
 }
 
 /// Says on standard error what may be wrong with a plant that can be used.

@@ -316,6 +316,15 @@ fn hint(nearest: &Option<String>) -> String {
         .unwrap_or_default()
 }
 
+/// Errors one below the other, and how many they are.
+pub fn render_all(errors: &[SpecError], file: &str, text: &str) -> String {
+    let mut lines: Vec<String> = errors.iter().map(|e| e.render(file, text)).collect();
+    if errors.len() > 1 {
+        lines.push(format!("{} errors", errors.len()));
+    }
+    lines.join("\n")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

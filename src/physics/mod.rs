@@ -18,7 +18,7 @@ mod spec;
 mod syntax;
 mod units;
 
-pub use error::{SpecError, SpecErrorKind};
+pub use error::{SpecError, SpecErrorKind, render_all};
 pub use expression::{Binary, ExpressionId, Expressions, Function, Node, Span, VariableId};
 pub use operating_point::{Linearisation, OperatingPlant, OperatingPoint, OperatingPointError};
 pub use simulated::{Run, RunError, Simulated, Slopes};

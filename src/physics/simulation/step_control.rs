@@ -52,7 +52,8 @@ const RAMP_STEP: f64 = 0.5;
 pub(super) struct StepControl<'p> {
     plant: &'p Plant,
     steps: Vec<u8>,
-    /// Attempts so far, and how many there may be.
+    /// Samples and attempts so far, and how many attempts there may be.
+    samples: usize,
     attempts: usize,
     most_attempts: usize,
     depth: u8,
@@ -127,6 +128,7 @@ impl<'p> StepControl<'p> {
         Self {
             plant,
             steps: Vec::new(),
+            samples: 0,
             attempts: 0,
             most_attempts,
             depth: 0,
@@ -208,17 +210,11 @@ impl<'p> StepControl<'p> {
                 (self.implicit, self.depth) = (false, STIFF - 2);
             }
         }
+        self.samples = k + 1;
         let parts = integrator.parts(k, excitation);
         for (start, length) in &parts {
             integrator.begin_part(start, length, k, excitation, parts.len() == 1);
             self.part(integrator, start, length)?;
-            if self.attempts > self.most_attempts {
-                return Err(SimulationError::TooFast {
-                    time: start.value,
-                    steps: self.attempts,
-                    samples: k + 1,
-                });
-            }
         }
         Ok(())
     }
@@ -280,6 +276,13 @@ impl<'p> StepControl<'p> {
             let step = share(size) * length.value;
             let attempt = self.attempt(integrator, &time, step, depth);
             self.attempts += 1;
+            if self.attempts > self.most_attempts {
+                return Err(SimulationError::TooFast {
+                    time: time.value,
+                    steps: self.attempts,
+                    samples: self.samples,
+                });
+            }
             let accepted = matches!(attempt, Attempt::Error(e) if e <= 1.0);
             if !accepted && depth < finest {
                 depth += 1;
