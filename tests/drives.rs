@@ -104,15 +104,24 @@ fn ask(missing: Missing, speed: bool, mut dice: Dice) -> Answer {
     let simulation = Simulation::Model(Box::new(model), "nominal".to_owned());
     let said = explain(&[recording], &simulation, &Options::default()).unwrap();
     let names: Vec<String> = said.effects.iter().map(|e| e.effect.clone()).collect();
-    let ran = said.model.simulate(&[&fresh.input], None, None).unwrap();
+    let ran = said
+        .model
+        .as_ref()
+        .unwrap()
+        .simulate(&[&fresh.input], None, None)
+        .unwrap();
     let fit = fit_percent(&fresh.output, &ran[0]);
     let mass = said
         .model
+        .as_ref()
+        .unwrap()
         .mechanics
         .as_ref()
         .map_or(f64::NAN, |m| m.mass.value / drive.mass);
     let mass_std = said
         .model
+        .as_ref()
+        .unwrap()
         .mechanics
         .as_ref()
         .and_then(|m| m.mass.std)

@@ -126,17 +126,6 @@ fn a_column_that_is_missing_is_said_with_the_columns_and_the_flags() {
 }
 
 #[test]
-fn explain_says_what_it_takes_instead_of_a_plant() {
-    let output = innovant(&["explain", &plant("csv"), "--simulation", &plant("mo")]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(
-        said(&output).contains("`explain` does not read plants in equations yet"),
-        "{}",
-        said(&output)
-    );
-}
-
-#[test]
 fn a_file_that_is_no_text_is_called_so() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("a.mo");

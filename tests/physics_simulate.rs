@@ -257,6 +257,49 @@ fn delays_of_inputs_are_exact_between_samples() {
 }
 
 /// `x' = -x(t - 1)` from `x = 1`: `1 - t` in the first second, `1 - t + (t - 1)^2/2` in the second.
+/// Slopes by delays against differences, from whole samples (where most searches start), parts of them, and equal ones.
+#[test]
+fn delays_have_slopes_wherever_a_search_starts() {
+    let plant = plant(
+        "model Lag parameter Real T(min=0)=0.13; parameter Real S(min=0)=0.13; input Real u; input Real v; output Real y;
+         Real x(start=0); equation der(x) = delay(u, T) + 0.5*delay(v, S) - x^3 - x; y = x; end Lag;",
+    );
+    let u = signal(120, 1.0);
+    let v: Vec<f64> = u.iter().rev().copied().collect();
+    let inputs = [u.as_slice(), v.as_slice()];
+    let excitation = excitation(&inputs, 120, 0.1, Hold::Zero);
+    let directions = [Direction::Parameter(0), Direction::Parameter(1)];
+    for delays in [
+        [0.0, 0.0],
+        [0.1, 0.1],
+        [0.3, 0.3],
+        [0.13, 0.13],
+        [0.7, 0.26],
+    ] {
+        let mut point = plant.nominal();
+        point.parameters = delays.to_vec();
+        let run = plant.simulate(&point, &excitation, None).unwrap();
+        let slopes = plant.sensitivities(&point, &excitation, None, &run.plan, &directions);
+        for (which, slope) in slopes[0].iter().enumerate() {
+            let step = 1e-4;
+            let mut moved = point.clone();
+            moved.parameters[which] += step;
+            let later = plant.simulate(&moved, &excitation, None).unwrap();
+            let (mut error, mut size) = (0.0, 0.0);
+            for ((after, before), slope) in later.outputs[0].iter().zip(&run.outputs[0]).zip(slope)
+            {
+                let difference = (after - before) / step;
+                error += (difference - slope).powi(2);
+                size += difference.powi(2);
+            }
+            assert!(
+                size > 0.1 && error < 1e-4 * size,
+                "{delays:?}, {which}: {error} of {size}"
+            );
+        }
+    }
+}
+
 #[test]
 fn states_may_be_delayed() {
     let plant = plant(

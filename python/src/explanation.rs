@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use innovant::explain::{Options, Simulation, explain as explain_logs};
+use innovant::explain::{AugmentedModel, Options, Simulation, explain as explain_logs};
 use innovant::log::write_file_atomically;
 use innovant::report::text::explanation_text;
 use innovant::report::{explanation_page, parse_explanation, to_json};
@@ -39,14 +39,15 @@ impl Explanation {
 
     /// Whether simulating takes the answer of the original simulator.
     fn needs_simulation(&self) -> bool {
-        self.explanation.model.reference.is_some()
+        let model = self.explanation.model.as_ref();
+        model.is_some_and(|m| m.reference.is_some())
     }
 
     /// Headers of the inputs, of the outputs.
-    fn names(&self) -> (Vec<String>, Vec<String>) {
-        let model = &self.explanation.model;
+    fn names(&self) -> PyResult<(Vec<String>, Vec<String>)> {
+        let model = self.model()?;
         let of = |list: &[innovant::log::Channel]| list.iter().map(ToString::to_string).collect();
-        (of(&model.inputs), of(&model.outputs))
+        Ok((of(&model.inputs), of(&model.outputs)))
     }
 
     /// Writes the page; the file appears whole or not at all.
@@ -66,11 +67,10 @@ impl Explanation {
         simulation: Option<Samples<'py>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (inputs, given) = (columns(&u), simulation.as_ref().map(columns));
+        let model = self.model()?;
         let outputs = py.detach(|| {
             let given = given.as_deref().map(slices);
-            self.explanation
-                .model
-                .simulate(&slices(&inputs), x0.as_deref(), given.as_deref())
+            model.simulate(&slices(&inputs), x0.as_deref(), given.as_deref())
         });
         Ok(samples(py, &outputs.map_err(raise)?))
     }
@@ -83,12 +83,18 @@ impl Explanation {
         y: Samples<'py>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (inputs, outputs) = (columns(&u), columns(&y));
-        let state = py.detach(|| {
-            self.explanation
-                .model
-                .estimate_initial_state(&slices(&inputs), &slices(&outputs))
-        });
+        let model = self.model()?;
+        let state = py.detach(|| model.estimate_initial_state(&slices(&inputs), &slices(&outputs)));
         Ok(state.map_err(raise)?.to_pyarray(py))
+    }
+}
+
+impl Explanation {
+    /// The linear model with effects that explanations of linear simulations hold.
+    fn model(&self) -> PyResult<&AugmentedModel> {
+        self.explanation.model.as_ref().ok_or_else(|| {
+            raise("this explains a plant in equations: simulate the text in `plant.modelica` with innovant.Plant")
+        })
     }
 }
 

@@ -6,9 +6,10 @@ use clap::Args;
 
 use super::align::aligned;
 use super::output::{Output, check_distinct, note, paths, print};
+use super::plant::{is_plant_file, load, read_recordings, tell_warnings};
 use super::roles::{RoleFlags, tell_reading};
 use super::{Outcome, Verbosity};
-use crate::explain::{Explanation, Options, Simulation, Verdict, explain};
+use crate::explain::{Explanation, Options, Simulation, Verdict, explain, explain_plant};
 use crate::log::{Channel, Log, LogError, Reading, RoleNeed, Roles, Source};
 use crate::report::text::explanation_text;
 use crate::report::{explanation_page, read_model, to_json};
@@ -19,7 +20,8 @@ const EXAMPLE: &str = "Examples:
   innovant simulate explanation.json new_input.csv --output prediction.csv
 
 The simulation is a CSV of its outputs on the recorded inputs (one file a recording, in the same order; compared by time,
-on a grid of its own if that is finer), or one linear model as JSON ({\"A\":..,\"B\":..,\"C\":..,\"D\":..,\"dt\":..}, or what `innovant identify` writes).
+on a grid of its own if that is finer), one linear model as JSON ({\"A\":..,\"B\":..,\"C\":..,\"D\":..,\"dt\":..}, or what `innovant identify` writes), or
+a plant in equations (.mo), whose parameters may differ within their bounds.
 
 Effects (for --without):
   coulomb_friction stribeck_friction quadratic_drag cubic_stiffness quadratic_stiffness end_stop hysteresis
@@ -40,7 +42,7 @@ pub(super) struct Flags {
     /// Recordings: CSV, also gzipped; `-` is standard input
     #[arg(value_name = "LOG", required = true)]
     logs: Vec<Source>,
-    /// Simulated outputs (CSV, one file a recording) or a linear model (JSON)
+    /// Simulated outputs (CSV, one file a recording), a linear model (JSON), or a plant in equations (.mo)
     #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
     simulation: Vec<PathBuf>,
     #[command(flatten)]
@@ -72,6 +74,10 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     let read = paths(&sources);
     let (output, report) =
         Output::check_both(flags.output.as_deref(), flags.report.as_deref(), &read)?;
+    if let Some(plant) = flags.simulation.iter().find(|f| is_plant_file(f)) {
+        let explanation = of_plant(&flags, plant, say)?;
+        return tell(&flags, &explanation, output.as_ref(), report.as_ref(), say);
+    }
     let roles = flags.roles.clone().roles();
     let mut readings: Vec<Reading> = Vec::with_capacity(flags.logs.len());
     for source in &flags.logs {
@@ -91,18 +97,56 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         seed: flags.seed,
     };
     let explanation = explain(&logs, &simulation, &options)?;
-    if let Some(output) = &output {
-        output.write(&to_json(&explanation)?)?;
+    tell(&flags, &explanation, output.as_ref(), report.as_ref(), say)
+}
+
+/// What a plant in equations leaves out.
+fn of_plant(flags: &Flags, plant: &Path, say: Verbosity) -> anyhow::Result<Explanation> {
+    if flags.simulation.len() > 1 {
+        anyhow::bail!(
+            "--simulation takes one plant in equations for all recordings; {} files are given",
+            flags.simulation.len()
+        );
     }
-    if let Some(report) = &report {
-        report.write(&explanation_page(&explanation)?)?;
+    if !flags.without.is_empty() || !flags.map.is_empty() {
+        anyhow::bail!(
+            "--without and --map are not available with a plant in equations yet; leave them out"
+        );
     }
-    let to_stdout = [&output, &report]
+    let loaded = load(plant)?;
+    tell_warnings(&loaded, say);
+    let at_values = loaded.plant.with_values(&loaded.point.parameters);
+    let (logs, recordings) = read_recordings(
+        &at_values,
+        &flags.logs,
+        &flags.roles,
+        RoleNeed::Identify,
+        say,
+    )?;
+    explain_plant(&at_values, &logs, recordings, loaded.hold)
+        .map_err(|e| anyhow::anyhow!("{}: {e}", plant.display()))
+}
+
+/// Writes and prints the explanation.
+fn tell(
+    flags: &Flags,
+    explanation: &Explanation,
+    output: Option<&Output>,
+    report: Option<&Output>,
+    say: Verbosity,
+) -> anyhow::Result<Outcome> {
+    if let Some(output) = output {
+        output.write(&to_json(explanation)?)?;
+    }
+    if let Some(report) = report {
+        report.write(&explanation_page(explanation)?)?;
+    }
+    let to_stdout = [output, report]
         .into_iter()
         .flatten()
         .any(Output::is_stdout);
     if !say.quiet {
-        let text = explanation_text(&explanation);
+        let text = explanation_text(explanation);
         if to_stdout {
             note(&text);
         } else {
@@ -110,7 +154,7 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         }
     }
     let asked = flags.exit_code || (flags.output.is_none() && flags.report.is_none());
-    Ok(if asked && missing(&explanation) {
+    Ok(if asked && missing(explanation) {
         Outcome::Rejected
     } else {
         Outcome::Done
@@ -130,13 +174,6 @@ fn simulation(
     say: Verbosity,
 ) -> anyhow::Result<(Vec<Log>, Simulation)> {
     let files = &flags.simulation;
-    if let Some(plant) = files.iter().find(|f| super::plant::is_plant_file(f)) {
-        anyhow::bail!(
-            "{}: `explain` does not read plants in equations yet; give a linear model (JSON), or the outputs that `innovant \
-             simulate` computes with this plant (CSV)",
-            plant.display()
-        );
-    }
     let is_json = |path: &Path| {
         path.extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("json"))

@@ -7,11 +7,12 @@ use anyhow::Context;
 use super::Verbosity;
 use super::output::note;
 use super::roles::{RoleFlags, tell_reading};
+use crate::explain::Explanation;
 use crate::identify::{IdentifiedChannel, Recording};
 use crate::log::{Channel, Log, LogError, Reading, RoleNeed, Roles, Source};
 use crate::physics::estimate::PlantRecording;
 use crate::physics::{Hold, Plant, Point, VariableId, diagnose, render_all, unknown_units};
-use crate::report::{PlantDocument, is_plant};
+use crate::report::{PlantDocument, is_explanation, is_plant, parse_explanation};
 
 /// A plant from a file.
 pub(super) struct LoadedPlant {
@@ -21,6 +22,8 @@ pub(super) struct LoadedPlant {
     pub hold: Hold,
     /// What was estimated, where the file says so.
     pub document: Option<PlantDocument>,
+    /// The explanation that it comes from.
+    pub explanation: Option<Explanation>,
     /// What may be wrong with the text.
     pub warnings: Vec<String>,
 }
@@ -32,9 +35,18 @@ impl LoadedPlant {
     }
 }
 
-/// Whether a file holds a plant: a text by its name, or a document by what it says.
+/// Whether a file holds a plant: a text by its name, or a document by what it says; also what explains one.
 pub(super) fn is_plant_file(path: &Path) -> bool {
-    is_text(path) || std::fs::read_to_string(path).is_ok_and(|text| is_plant(&text))
+    is_text(path)
+        || std::fs::read_to_string(path)
+            .is_ok_and(|text| is_plant(&text) || explained(path, &text).is_some())
+}
+
+/// An explanation of a plant.
+fn explained(path: &Path, text: &str) -> Option<Explanation> {
+    let read = || parse_explanation(&path.display().to_string(), text);
+    let explanation = is_explanation(text).then(read)?.ok()?;
+    explanation.plant.is_some().then_some(explanation)
 }
 
 fn is_text(path: &Path) -> bool {
@@ -51,6 +63,21 @@ pub(super) fn load(path: &Path) -> anyhow::Result<LoadedPlant> {
         }
         _ => anyhow::anyhow!("{name}: cannot be read: {e}"),
     })?;
+    if let Some(explanation) = explained(path, &text)
+        && let Some(found) = &explanation.plant
+    {
+        let hold = if found.hold == "linear" {
+            Hold::Linear
+        } else {
+            Hold::Zero
+        };
+        let loaded = of_text(&name, &found.modelica)?;
+        return Ok(LoadedPlant {
+            hold,
+            explanation: Some(explanation),
+            ..loaded
+        });
+    }
     if !is_text(path) && text.trim_start().starts_with('{') {
         let document = PlantDocument::parse(&name, &text)?;
         let (plant, point) = document
@@ -62,11 +89,16 @@ pub(super) fn load(path: &Path) -> anyhow::Result<LoadedPlant> {
             point,
             hold: document.hold(),
             document: Some(document),
+            explanation: None,
             warnings: vec![],
         });
     }
-    let spec = diagnose(&text)
-        .map_err(|errors| anyhow::anyhow!("{}", render_all(&errors, &name, &text)))?;
+    of_text(&name, &text)
+}
+
+fn of_text(name: &str, text: &str) -> anyhow::Result<LoadedPlant> {
+    let spec =
+        diagnose(text).map_err(|errors| anyhow::anyhow!("{}", render_all(&errors, name, text)))?;
     let unknown = unknown_units(&spec).into_iter();
     let warnings = unknown
         .map(|u| format!("{name}:{}:{}: {u}", u.line, u.column))
@@ -78,6 +110,7 @@ pub(super) fn load(path: &Path) -> anyhow::Result<LoadedPlant> {
         point,
         hold: Hold::Zero,
         document: None,
+        explanation: None,
         warnings,
     })
 }

@@ -189,8 +189,10 @@ fn simulate_explanation(
     explanation: &Explanation,
     say: Verbosity,
 ) -> anyhow::Result<Outcome> {
-    let model = &explanation.model;
     let name = flags.model.display().to_string();
+    let Some(model) = &explanation.model else {
+        anyhow::bail!("{name}: `model` and `plant` are both missing; explain the recording again");
+    };
     let channel = |c: &Channel| IdentifiedChannel {
         channel: c.clone(),
         level: 0.0,

@@ -4,10 +4,11 @@ use std::path::Path;
 
 use super::output::note;
 use super::plant::{
-    LoadedPlant, assignments, channels, load, read_recordings, recording, set_parameters,
-    set_start, tell_warnings,
+    LoadedPlant, assignments, load, read_recordings, recording, set_parameters, set_start,
+    tell_warnings,
 };
 use super::roles::RoleFlags;
+use super::validate::all_known;
 use super::{Outcome, Verbosity};
 use crate::log::{Channel, RoleNeed, Source, write_table};
 use crate::physics::estimate::{EstimateOptions, Form, estimate};
@@ -46,6 +47,7 @@ pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         mut point,
         hold,
         document,
+        explanation,
         ..
     } = loaded;
     let hold = asked.hold.unwrap_or(hold);
@@ -73,6 +75,15 @@ pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         );
     }
     let log = logs.remove(0);
+    if let Some(explanation) = &explanation
+        && let Some(found) = &explanation.plant
+        && !all_known(&explanation.recordings, std::slice::from_ref(&log))
+    {
+        let before = log.start_time - log.sample_time;
+        let times = found.times_of_change.iter();
+        let changed: Vec<(String, f64)> = times.map(|name| (name.clone(), before)).collect();
+        set_parameters(&plant, &mut point, &changed)?;
+    }
     match &asked.start {
         Start::Text => {
             // On a recording that it was estimated from, a plant starts where that was found to start.
@@ -114,20 +125,12 @@ pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
     let run = plant
         .simulate(&point, &excitation, None)
         .map_err(|e| anyhow::anyhow!("{}: {e}", asked.plant.display()))?;
-    let (_, outputs) = channels(&plant);
-    let units = plant
-        .spec
-        .outputs()
-        .into_iter()
-        .map(|v| plant.spec.variable(v).unit_text.clone());
-    let named: Vec<Channel> = outputs
-        .into_iter()
-        .zip(units)
-        .map(|(c, unit)| Channel {
-            name: c.channel.name,
-            unit,
-        })
-        .collect();
+    let declared = plant.spec.outputs().into_iter().map(|v| Channel {
+        name: plant.spec.variable(v).column().to_owned(),
+        unit: plant.spec.variable(v).unit_text.clone(),
+    });
+    let found = explanation.and_then(|e| e.plant);
+    let named: Vec<Channel> = found.map_or_else(|| declared.collect(), |p| p.outputs);
     let columns: Vec<(&Channel, &[f64])> = named
         .iter()
         .zip(run.outputs.iter().map(Vec::as_slice))

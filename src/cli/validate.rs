@@ -209,7 +209,7 @@ fn relation(model: &Model, logs: &[Log]) -> Relation {
 }
 
 /// Whether every log is one of the recordings, by its SHA-256.
-fn all_known(recordings: &[Recording], logs: &[Log]) -> bool {
+pub(super) fn all_known(recordings: &[Recording], logs: &[Log]) -> bool {
     logs.iter().all(|log| {
         recordings
             .iter()

@@ -89,6 +89,9 @@ impl Answer<'_> {
                 definition
             };
             let mut effect_found = EffectFound {
+                enters: None,
+                depends: vec![],
+                law: None,
                 effect: definition.id.to_owned(),
                 variant: definition.variant.to_owned(),
                 signal,
@@ -197,6 +200,9 @@ impl Answer<'_> {
     fn exact(&self, id: &str, output: usize, numbers: &[(&str, f64, &str)]) -> Option<EffectFound> {
         let definition = effects::find(id, "")?;
         let mut found = EffectFound {
+            enters: None,
+            depends: vec![],
+            law: None,
             effect: id.to_owned(),
             variant: String::new(),
             signal: self.outputs()[output].name.clone(),

@@ -137,7 +137,8 @@ impl Answer<'_> {
             detectable: self.detectable(verdict),
             noise: self.noise(model),
             curve,
-            model: augmented,
+            model: Some(augmented),
+            plant: None,
             signals: self.signals(boring, model),
             recordings: self
                 .recordings
@@ -156,7 +157,10 @@ impl Answer<'_> {
             );
         }
         if let (Some(mechanics), true) = (
-            &explanation.model.mechanics,
+            explanation
+                .model
+                .as_ref()
+                .and_then(|m| m.mechanics.as_ref()),
             matches!(verdict, Verdict::Parameters | Verdict::Unexplained),
         ) {
             explanation.summary.insert(1, mechanics.sentence.clone());
@@ -470,7 +474,7 @@ fn probability_text(p: f64) -> String {
 
 /// Samples that stand for all, at most about `most`: the smallest and the largest value of each stretch, so that no peak
 /// of the error is lost.
-fn extremes(error: &[f64], most: usize) -> Vec<usize> {
+pub(crate) fn extremes(error: &[f64], most: usize) -> Vec<usize> {
     if error.len() <= most {
         return (0..error.len()).collect();
     }

@@ -77,8 +77,12 @@ pub struct Explanation {
     /// The missing static law as the recording shows it, without a form assumed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub curve: Option<Curve>,
-    /// The augmented model, ready to simulate.
-    pub model: AugmentedModel,
+    /// The augmented model, ready to simulate; absent where the simulation is a plant in equations.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<AugmentedModel>,
+    /// The plant in equations with what was left out, ready to simulate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plant: Option<AugmentedPlant>,
     /// Signals for pictures, thinned out.
     pub signals: Vec<SignalTraces>,
     /// The recordings.
@@ -99,14 +103,50 @@ pub struct EffectFound {
     pub signal: String,
     /// Where it acts: `input`, `force`, `sensor`, `path`, or `process` where it is the plant itself.
     pub port: String,
-    /// The law.
+    /// The law; of a plant in equations the changed equation, in its own language.
     pub equation: String,
+    /// Of a plant in equations: the variable whose equation is changed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub enters: Option<String>,
+    /// Of a plant in equations: the variables that the change is a function of.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub depends: Vec<String>,
+    /// The change as a curve of one variable, where it is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law: Option<Law>,
     /// Its numbers.
     pub parameters: BTreeMap<String, Quantity>,
     /// What speaks for it.
     pub evidence: Evidence,
     /// In plain words.
     pub sentence: String,
+}
+
+/// What is added to the right-hand side of an equation, over the values that a variable had.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Law {
+    /// The variable.
+    pub variable: String,
+    /// Its values.
+    pub at: Vec<f64>,
+    /// What is added there.
+    pub value: Vec<f64>,
+    /// Standard deviation, given the form.
+    pub std: Vec<f64>,
+}
+
+/// A plant in equations with what was left out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct AugmentedPlant {
+    /// Flat Modelica with the changes and the estimated values.
+    pub modelica: String,
+    /// How its inputs behave between samples.
+    pub hold: String,
+    /// Its outputs as the recordings call them.
+    pub outputs: Vec<Channel>,
+    /// Parameters that say when something has changed. Another recording comes after that.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub times_of_change: Vec<String>,
 }
 
 /// A number with its uncertainty and unit.

@@ -23,6 +23,7 @@
 //! | `check` | the data before the physics: dropouts, outliers, wraps, clocks, signs, units, exchanged outputs, a stuck sensor |
 //! | `adequacy` | tests of what is left |
 //! | `locate`, `curve`, `prove`, `probability` | where, the law without a form, held-out blocks, how sure |
+//! | `engine`, `plant_answer` | simulations that are plants in equations: terms at places of the equations, and what is said |
 //! | `answer`, `account`, `words`, `explanation`, `augmented`, `start` | what is said, and the model that can be run |
 
 mod account;
@@ -37,6 +38,7 @@ mod coordinates;
 mod curve;
 mod data;
 pub mod effects;
+mod engine;
 mod error;
 mod explanation;
 mod features;
@@ -50,6 +52,7 @@ mod locate;
 mod memory;
 mod offset;
 mod plant;
+mod plant_answer;
 mod plausible;
 mod probability;
 mod prove;
@@ -75,10 +78,11 @@ mod words;
 pub use augmented::AugmentedError;
 pub use error::ExplainError;
 pub use explanation::{
-    Alternative, AugmentedModel, Curve, Detectable, EXPLANATION_FORMAT, EffectFound, EffectSize,
-    Evidence, Explanation, FitFigure, FitSteps, FitTable, Location, Mechanics, ModelEffect,
-    NoiseFound, ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces,
-    StatePrior, Verdict,
+    Alternative, AugmentedModel, AugmentedPlant, Curve, Detectable, EXPLANATION_FORMAT,
+    EffectFound, EffectSize, Evidence, Explanation, FitFigure, FitSteps, FitTable, Law, Location,
+    Mechanics, ModelEffect, NoiseFound, ParameterChange, Quantity, Regime, Remaining,
+    SignalReference, SignalTraces, StatePrior, Verdict,
 };
+pub use plant_answer::explain_plant;
 pub use question::{Options, explain};
 pub use simulation::Simulation;

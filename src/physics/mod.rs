@@ -23,8 +23,8 @@ pub use expression::{Binary, ExpressionId, Expressions, Function, Node, Span, Va
 pub use operating_point::{Linearisation, OperatingPlant, OperatingPoint, OperatingPointError};
 pub use simulated::{Run, RunError, Simulated, Slopes};
 pub use simulation::{
-    Direction, Excitation, Hold, LinearPlant, Observer, Plan, Plant, Point, SimulationError,
-    Trajectory,
+    Direction, Excitation, Hold, LinearPlant, Lineariser, Observer, Plan, Plant, Point,
+    SimulationError, Trajectory,
 };
 pub use spec::{Equation, ModelSpec, Unknown, Variable, VariableKind};
 pub use syntax::{diagnose, parse};

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::error::{DocumentError, repeated};
 use super::location::position_of;
 use super::read::{broken, no_document};
-use crate::explain::{EXPLANATION_FORMAT, Explanation};
+use crate::explain::{AugmentedModel, EXPLANATION_FORMAT, Explanation};
 
 /// Whether `text` is JSON that calls itself an explanation.
 pub fn is_explanation(text: &str) -> bool {
@@ -54,7 +54,8 @@ pub fn parse_explanation(name: &str, text: &str) -> Result<Explanation, Document
     }
     explanation
         .model
-        .check()
+        .as_ref()
+        .map_or(Ok(()), AugmentedModel::check)
         .map_err(|error| DocumentError::Content {
             name: name.to_owned(),
             place: position_of(text, "model")

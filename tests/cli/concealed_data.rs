@@ -219,6 +219,8 @@ fn round_trip(case: &str, data: &Path, scratch: &Folder, explanation: &Explanati
         .map(|log| log.output_data.iter().map(Vec::as_slice).collect());
     let outputs = explanation
         .model
+        .as_ref()
+        .unwrap()
         .simulate(&inputs, None, simulated.as_deref())
         .unwrap();
     assert_eq!(header.len(), outputs.len() + 1, "{case}");

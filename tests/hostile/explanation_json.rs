@@ -49,7 +49,7 @@ pub fn explanation(read: &Explanation) {
     if let Err(error) = explanation_page(read) {
         sound::refusal(&error);
     }
-    let model = &read.model;
+    let Some(model) = &read.model else { return };
     let inputs: Vec<Vec<f64>> = (0..model.inputs.len())
         .map(|i| white(i as u64, SAMPLES))
         .collect();

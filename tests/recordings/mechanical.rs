@@ -72,15 +72,25 @@ fn is_the_drive(said: &Explanation, fresh: &Log) {
     // Other laws were asked, and are far behind.
     let rival = &said.alternatives[0];
     assert!(rival.support < 0.9, "{rival:?}");
-    let mechanics = said.model.mechanics.as_ref().unwrap();
+    let mechanics = said.model.as_ref().unwrap().mechanics.as_ref().unwrap();
     assert!((mechanics.mass.value / 95.0 - 1.0).abs() < 0.03);
     assert!((mechanics.viscous_friction.value / 203.0 - 1.0).abs() < 0.05);
     assert!(said.effects[0].sentence.contains(&mechanics.sentence));
     let input: Vec<&[f64]> = fresh.input_data.iter().map(Vec::as_slice).collect();
     let output: Vec<&[f64]> = fresh.output_data.iter().map(Vec::as_slice).collect();
-    let start = said.model.estimate_initial_state(&input, &output).unwrap();
+    let start = said
+        .model
+        .as_ref()
+        .unwrap()
+        .estimate_initial_state(&input, &output)
+        .unwrap();
     for initial in [None, Some(start.as_slice())] {
-        let ran = said.model.simulate(&input, initial, None).unwrap();
+        let ran = said
+            .model
+            .as_ref()
+            .unwrap()
+            .simulate(&input, initial, None)
+            .unwrap();
         let (missed, fit) = error(output[0], &ran[0], 0);
         println!(
             "free run on the other recording: {:.2} mm, {fit:.1} %",
@@ -128,8 +138,18 @@ fn an_oscillator_has_a_cubic_spring_and_nothing_else() {
         // The benchmark gives the first 50 samples for the state.
         let first: Vec<&[f64]> = vec![&test.output_data[0][..50]];
         let begun: Vec<&[f64]> = vec![&input[0][..50]];
-        let start = said.model.estimate_initial_state(&begun, &first).unwrap();
-        let ran = said.model.simulate(&input, Some(&start), None).unwrap();
+        let start = said
+            .model
+            .as_ref()
+            .unwrap()
+            .estimate_initial_state(&begun, &first)
+            .unwrap();
+        let ran = said
+            .model
+            .as_ref()
+            .unwrap()
+            .simulate(&input, Some(&start), None)
+            .unwrap();
         let (missed, _) = error(&test.output_data[0], &ran[0], 50);
         println!("{name}: {:.3} mV", 1e3 * missed);
         assert!(missed <= most, "{name}: {missed}");

@@ -234,6 +234,8 @@ fn removed(case: &Case, explanation: &Explanation) -> Result<f64, String> {
         .map(|s| s.iter().map(Vec::as_slice).collect());
     let predicted = explanation
         .model
+        .as_ref()
+        .unwrap()
         .simulate(&inputs, None, simulated.as_deref())
         .map_err(|error| error.to_string())?;
     let (y, truth) = (&predicted[0], &case.fresh_truth[0]);

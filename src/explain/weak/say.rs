@@ -159,6 +159,9 @@ impl Answer<'_> {
                 );
             }
             let mut effect = EffectFound {
+                enters: None,
+                depends: vec![],
+                law: None,
                 effect: definition.id.to_owned(),
                 variant: definition.variant.to_owned(),
                 signal: if form.on_input() {

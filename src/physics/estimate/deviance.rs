@@ -12,7 +12,7 @@ use crate::physics::simulation::{Direction, Observer, Plan, Point, Trajectory};
 
 /// Runs of all recordings at a point.
 #[derive(Clone)]
-struct Runs {
+pub(super) struct Runs {
     at: Vec<f64>,
     plans: Vec<Plan>,
     residual: Series,
@@ -73,7 +73,7 @@ impl<'p, 'a> Deviance<'p, 'a> {
         problem.plant.run(&runs).ok()
     }
 
-    fn run(&self, point: &[f64]) -> Option<Runs> {
+    pub(super) fn run(&self, point: &[f64]) -> Option<Runs> {
         let trajectories = self.runs(point)?;
         let mut residual = Series::new();
         for (r, t) in self.problem.recordings.iter().zip(&trajectories) {

@@ -192,7 +192,7 @@ pub(super) fn coloured_fit(problem: &Problem, mut point: Vec<f64>, rival: f64) -
 }
 
 /// Improves a point under white noise whose size is that of what is left; gives the deviance with the size at the end.
-fn white_fit(problem: &Problem, point: &mut Vec<f64>, effort: Effort) -> Option<f64> {
+pub(super) fn white_fit(problem: &Problem, point: &mut Vec<f64>, effort: Effort) -> Option<f64> {
     white_fit_holding(problem, point, effort, None)
 }
 

@@ -15,11 +15,13 @@ mod observer;
 mod optimise;
 mod problem;
 mod profile;
+mod study;
 
 pub use adequacy::{Question, ResidualTest};
 pub use determined::Undetermined;
 pub use evaluate::{Evaluation, Held, HeldNoise, evaluate};
 pub use problem::{EstimateError, PlantRecording};
+pub(crate) use study::Study;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -28,7 +30,7 @@ use self::deviance::Deviance;
 use self::free_run::{
     GLANCED_SAMPLES, coloured_fit, continue_free_run, fit_free_run, leaves_noise,
 };
-use self::optimise::Effort;
+pub(crate) use self::optimise::Effort;
 use self::problem::Problem;
 use super::simulated::Simulated;
 use super::simulation::{Hold, Point};
@@ -144,28 +146,35 @@ pub fn estimate(
     } else {
         options.form
     };
+    let (best, other) = best_fit(&problem, form)?;
+    let estimate = finish(&problem, best, other);
+    stopped(plant).map_or(Ok(estimate), Err)
+}
+
+/// The likelier fit, with the criterion of the other form where that was fitted too.
+fn best_fit(problem: &Problem, form: Option<Form>) -> Result<(Fit, Option<f64>), EstimateError> {
     let (free_run, innovation) = match form {
-        Some(Form::FreeRun) => (fit_free_run(&problem), None),
-        Some(Form::Innovation) => (None, observer::fit(&problem, None)),
-        None if observer::integrates(&problem) => {
+        Some(Form::FreeRun) => (fit_free_run(problem), None),
+        Some(Form::Innovation) => (None, observer::fit(problem, None)),
+        None if observer::integrates(problem) => {
             // In free run the errors of such a plant grow: it comes second, from where the observer has led.
-            let innovation = observer::fit(&problem, None);
+            let innovation = observer::fit(problem, None);
             let free_run = match &innovation {
-                Some(fit) => continue_free_run(&problem, fit),
-                None => fit_free_run(&problem),
+                Some(fit) => continue_free_run(problem, fit),
+                None => fit_free_run(problem),
             };
             // What looks like a gain of the observer then is one of its many summits where errors grow.
-            let noise = free_run.as_ref().is_some_and(|f| leaves_noise(&problem, f));
+            let noise = free_run.as_ref().is_some_and(|f| leaves_noise(problem, f));
             (free_run, innovation.filter(|_| !noise))
         }
         None => {
-            let free_run = fit_free_run(&problem);
+            let free_run = fit_free_run(problem);
             // Where free run leaves white noise an observer has nothing to correct.
             let coloured = free_run
                 .as_ref()
                 .is_none_or(|f| f.noise.colours.iter().any(|c| c.len() > 0));
             let innovation = if coloured {
-                promising_innovation(&problem, free_run.as_ref())
+                promising_innovation(problem, free_run.as_ref())
             } else {
                 None
             };
@@ -173,7 +182,7 @@ pub fn estimate(
             match innovation {
                 // From where the observer has led, the free run may find a higher summit.
                 Some(i) if wins(&i) => {
-                    let again = continue_free_run(&problem, &i);
+                    let again = continue_free_run(problem, &i);
                     let better = again.as_ref().is_some_and(|a| {
                         free_run.as_ref().is_none_or(|f| a.criterion < f.criterion)
                     });
@@ -183,14 +192,12 @@ pub fn estimate(
             }
         }
     };
-    let (best, other) = match (free_run, innovation) {
-        (Some(a), Some(b)) if b.criterion < a.criterion => (b, Some(a.criterion)),
-        (Some(a), b) => (a, b.map(|b| b.criterion)),
-        (None, Some(b)) => (b, None),
-        (None, None) => return Err(stopped(plant).unwrap_or_else(|| problem.why_not())),
-    };
-    let estimate = finish(&problem, best, other);
-    stopped(plant).map_or(Ok(estimate), Err)
+    match (free_run, innovation) {
+        (Some(a), Some(b)) if b.criterion < a.criterion => Ok((b, Some(a.criterion))),
+        (Some(a), b) => Ok((a, b.map(|b| b.criterion))),
+        (None, Some(b)) => Ok((b, None)),
+        (None, None) => Err(stopped(problem.plant.as_ref()).unwrap_or_else(|| problem.why_not())),
+    }
 }
 
 /// Why an external simulator asks to end, whatever was found until then.
@@ -199,13 +206,16 @@ fn stopped(plant: &dyn Simulated) -> Option<EstimateError> {
 }
 
 /// A fit in one of the forms.
-struct Fit {
-    form: Form,
+#[derive(Debug, Clone)]
+pub(crate) struct Fit {
+    pub form: Form,
     /// Parameters, initial states, and the gain where there is one.
-    point: Vec<f64>,
-    noise: Noise,
-    deviance: f64,
-    criterion: f64,
+    pub point: Vec<f64>,
+    pub noise: Noise,
+    /// `-2 log` likelihood.
+    pub deviance: f64,
+    /// Schwarz's criterion.
+    pub criterion: f64,
 }
 
 /// The fit in innovation form, unless free run is the better form on the first part of the recordings already.

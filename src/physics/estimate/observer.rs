@@ -44,11 +44,7 @@ pub(super) fn fit(problem: &Problem, from: Option<&[f64]>) -> Option<Fit> {
     }
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut ranges = problem.ranges();
-    ranges.extend((0..n * l).map(|_| Range {
-        min: f64::NEG_INFINITY,
-        max: f64::INFINITY,
-        reach: f64::INFINITY,
-    }));
+    ranges.extend(unbounded(n * l));
     let mut best: Option<Fit> = None;
     for (_, mut point) in starts.into_iter().take(2) {
         let mut objective = Deviance::new(problem, Form::Innovation, Noise::unit(l));
@@ -84,6 +80,18 @@ pub(super) fn fit(problem: &Problem, from: Option<&[f64]>) -> Option<Fit> {
         }
     }
     best
+}
+
+/// Ranges of numbers without bounds, such as the elements of a gain.
+pub(super) fn unbounded(count: usize) -> impl Iterator<Item = Range> {
+    std::iter::repeat_n(
+        Range {
+            min: f64::NEG_INFINITY,
+            max: f64::INFINITY,
+            reach: f64::INFINITY,
+        },
+        count,
+    )
 }
 
 /// Whether the plant, linearised at its mean, forgets its state more slowly than the longest recording lasts, or never.

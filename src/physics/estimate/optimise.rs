@@ -22,7 +22,7 @@ pub(super) struct Range {
 
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Effort {
+pub(crate) struct Effort {
     pub iterations: usize,
     /// Decrease of the deviance below which the search ends.
     pub settled: f64,

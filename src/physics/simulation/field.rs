@@ -26,9 +26,23 @@ pub(super) struct Field<'a, const M: usize> {
     /// False until the frame of the Jacobian has the inputs of now.
     inputs_in_jacobian: bool,
     past: Vec<Past<M>>,
+    /// When each delayed input jumps within a sample, and in which order they do.
+    jumps: Vec<Jump<M>>,
     /// Sample whose held value a delayed input has now, for each delay.
     source: Vec<usize>,
 }
+
+/// A delay of an input, in samples: the delayed value jumps at `phase`, to that of `whole` samples ago.
+#[derive(Debug, Clone)]
+struct Jump<const M: usize> {
+    whole: usize,
+    phase: Dual<M>,
+    /// Number of jumps up to it.
+    rank: usize,
+}
+
+/// A delay this close to whole samples is one but for rounding.
+const WHOLE: f64 = 1e-9;
 
 impl<'a, const M: usize> Field<'a, M> {
     /// `frame` has parameters with their slopes.
@@ -48,8 +62,10 @@ impl<'a, const M: usize> Field<'a, M> {
             sample: 0,
             inputs_in_jacobian: false,
             past: Vec::new(),
+            jumps: Vec::new(),
             source: Vec::new(),
         };
+        field.jumps = field.jumps();
         field.source = vec![0; tape.delays.len()];
         field.past = field.pasts();
         field
@@ -99,28 +115,49 @@ impl<'a, const M: usize> Field<'a, M> {
         self.inputs_in_jacobian = false;
     }
 
-    /// Boundaries of the parts of a sample in which every delayed input is constant, as fractions of the sample.
-    pub fn boundaries(&self) -> Vec<Dual<M>> {
-        let mut boundaries = vec![Dual::constant(0.0)];
-        for delay in self.tape.delays.iter().filter(|d| d.of_inputs) {
-            let mut phase = self.frame.slot[delay.time];
-            phase
-                .slope
-                .iter_mut()
-                .for_each(|s| *s /= self.excitation.sample_time);
-            phase.value = (phase.value / self.excitation.sample_time).rem_euclid(1.0);
-            boundaries.push(phase);
+    fn jumps(&self) -> Vec<Jump<M>> {
+        let jump = |slot: usize| {
+            let mut phase = self.frame.slot[slot];
+            let slopes = phase.slope.iter_mut();
+            slopes.for_each(|s| *s /= self.excitation.sample_time);
+            let samples = (phase.value / self.excitation.sample_time).max(0.0);
+            let whole = (samples + WHOLE).floor();
+            phase.value = (samples - whole).max(0.0);
+            Jump {
+                whole: whole as usize,
+                phase,
+                rank: 0,
+            }
+        };
+        let mut jumps: Vec<Jump<M>> = self.tape.delays.iter().map(|d| jump(d.time)).collect();
+        let mut order: Vec<usize> = (0..jumps.len())
+            .filter(|&i| self.tape.delays[i].of_inputs)
+            .collect();
+        order.sort_by(|&a, &b| jumps[a].phase.value.total_cmp(&jumps[b].phase.value));
+        for (before, i) in order.into_iter().enumerate() {
+            jumps[i].rank = before + 1;
         }
-        boundaries.sort_by(|a, b| a.value.total_cmp(&b.value));
+        jumps
+    }
+
+    /// Boundaries of the parts of a sample in which every delayed input is constant, as fractions of the sample. Delays of
+    /// whole samples, or equal ones, make parts of length 0, whose slopes count.
+    pub fn boundaries(&self) -> Vec<Dual<M>> {
+        let mut jumps: Vec<&Jump<M>> = self.jumps.iter().filter(|j| j.rank > 0).collect();
+        jumps.sort_by_key(|j| j.rank);
+        let mut boundaries = vec![Dual::constant(0.0)];
+        boundaries.extend(jumps.into_iter().map(|j| j.phase));
         boundaries.push(Dual::constant(1.0));
         boundaries
     }
 
-    /// Chooses, for a part of the sample with this middle, the sample that each delayed input comes from.
-    pub fn part(&mut self, middle: f64) {
-        for (source, delay) in self.source.iter_mut().zip(&self.tape.delays) {
-            let back = self.frame.slot[delay.time].value / self.excitation.sample_time;
-            *source = (self.sample as f64 + middle - back).floor().max(0.0) as usize;
+    /// Chooses the sample that each delayed input comes from: for a part between two boundaries, or at the sample itself.
+    pub fn part(&mut self, part: Option<usize>) {
+        for (source, jump) in self.source.iter_mut().zip(&self.jumps) {
+            let jumped = part.map_or(jump.phase.value == 0.0, |part| jump.rank <= part);
+            *source = self
+                .sample
+                .saturating_sub(jump.whole + usize::from(!jumped));
         }
     }
 

@@ -28,7 +28,7 @@ impl<const M: usize> Integrator<'_, M> {
     /// Takes the inputs of a sample and evaluates it.
     pub fn sample(&mut self, k: usize, excitation: &Excitation) {
         self.field.begin(k);
-        self.field.part(0.0);
+        self.field.part(None);
         let now = Dual::constant(excitation.time(k));
         self.field.evaluate(&now, &self.x, &mut self.first);
         if k == 0 {
@@ -99,21 +99,12 @@ impl<const M: usize> Integrator<'_, M> {
         true
     }
 
-    /// Begins a part of a sample.
-    pub fn begin_part(
-        &mut self,
-        start: &Dual<M>,
-        length: &Dual<M>,
-        k: usize,
-        excitation: &Excitation,
-        only: bool,
-    ) {
-        if only && self.field.tape.delays.is_empty() {
+    /// Begins a part of a sample, by its place among the parts.
+    pub fn begin_part(&mut self, start: &Dual<M>, part: usize) {
+        if self.field.tape.delays.is_empty() {
             return; // evaluated with the sample
         }
-        let middle =
-            (start.value + 0.5 * length.value - excitation.time(k)) / excitation.sample_time;
-        self.field.part(middle);
+        self.field.part(Some(part));
         self.field.evaluate(start, &self.x, &mut self.first);
     }
 
@@ -125,8 +116,8 @@ impl<const M: usize> Integrator<'_, M> {
         scale: &[f64],
     ) {
         let parts = self.parts(k, excitation);
-        for (start, length) in &parts {
-            self.begin_part(start, length, k, excitation, parts.len() == 1);
+        for (part, (start, length)) in parts.iter().enumerate() {
+            self.begin_part(start, part);
             let mut place = 0u32;
             while place < 1 << FINEST {
                 let Some(step) = steps.next() else { return };

@@ -67,23 +67,18 @@ impl LinearPlant {
     }
 }
 
-impl Plant {
-    /// Linearises at a state, inputs and a time; what is delayed has the value that it has now.
-    pub fn linearise(
-        &self,
-        point: &Point,
-        state: &[f64],
-        inputs: &[f64],
-        time: f64,
-    ) -> LinearPlant {
-        let tape = Tape::with_active_inputs(&self.spec);
+/// Linearises a plant at many points.
+pub struct Lineariser {
+    tape: Tape,
+    frame: Frame<LANES>,
+}
+
+impl Lineariser {
+    /// About a state, inputs and a time; what is delayed has the value that it has now.
+    pub fn at(&mut self, state: &[f64], inputs: &[f64], time: f64) -> LinearPlant {
+        let Self { tape, frame } = self;
         let (n, m, l) = (tape.states.len(), tape.inputs.len(), tape.outputs.len());
         let mut whole = DMatrix::zeros(n + l, n + m);
-        let mut frame: Frame<LANES> = tape.frame();
-        for (&slot, &value) in tape.parameters.iter().zip(&point.parameters) {
-            frame.slot[slot] = Dual::constant(value);
-        }
-        tape.run_parameters(&mut frame);
         frame.slot[tape.time] = Dual::constant(time);
         let sources: Vec<(usize, f64)> = tape
             .states
@@ -99,10 +94,10 @@ impl Plant {
                     frame.slot[slot].slope[i - first] = 1.0;
                 }
             }
-            tape.run_inputs(&mut frame);
+            tape.run_inputs(frame);
             // A delayed value is found by the sweep itself; as many sweeps as there are delays settle a chain of them.
             for _ in 0..=tape.delays.len() {
-                tape.run_states(&mut frame);
+                tape.run_states(frame);
                 for delay in &tape.delays {
                     frame.slot[delay.result] = frame.slot[delay.value];
                 }
@@ -125,6 +120,30 @@ impl Plant {
                 .collect(),
             output: tape.outputs.iter().map(|&s| frame.slot[s].value).collect(),
         }
+    }
+}
+
+impl Plant {
+    /// Made ready to be linearised with the parameters of `point`.
+    pub fn lineariser(&self, point: &Point) -> Lineariser {
+        let tape = Tape::with_active_inputs(&self.spec);
+        let mut frame: Frame<LANES> = tape.frame();
+        for (&slot, &value) in tape.parameters.iter().zip(&point.parameters) {
+            frame.slot[slot] = Dual::constant(value);
+        }
+        tape.run_parameters(&mut frame);
+        Lineariser { tape, frame }
+    }
+
+    /// Linearises at a state, inputs and a time.
+    pub fn linearise(
+        &self,
+        point: &Point,
+        state: &[f64],
+        inputs: &[f64],
+        time: f64,
+    ) -> LinearPlant {
+        self.lineariser(point).at(state, inputs, time)
     }
 
     /// A state at which nothing moves with these inputs, found by Newton's method from `state`; none when there is none nearby.

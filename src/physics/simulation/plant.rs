@@ -269,7 +269,7 @@ impl Plant {
     }
 
     /// The plant simulated with steps whose error is this part of how far a state has moved.
-    pub(in crate::physics) fn with_accuracy(&self, accuracy: f64) -> Self {
+    pub(crate) fn with_accuracy(&self, accuracy: f64) -> Self {
         Self {
             accuracy,
             ..self.clone()

@@ -212,8 +212,8 @@ impl<'p> StepControl<'p> {
         }
         self.samples = k + 1;
         let parts = integrator.parts(k, excitation);
-        for (start, length) in &parts {
-            integrator.begin_part(start, length, k, excitation, parts.len() == 1);
+        for (part, (start, length)) in parts.iter().enumerate() {
+            integrator.begin_part(start, part);
             self.part(integrator, start, length)?;
         }
         Ok(())

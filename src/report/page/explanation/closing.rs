@@ -118,19 +118,24 @@ fn channels(of: &[Channel]) -> String {
 
 /// Where everything comes from.
 pub(super) fn provenance(of: &Explanation) -> Provenance {
-    let model = &of.model;
-    let mut facts = vec![
-        ("Inputs", channels(&model.inputs)),
-        ("Outputs", channels(&model.outputs)),
-        ("Sample time", with_unit(&exact(model.sample_time), "s")),
-        ("States of the model", model.a.0.nrows().to_string()),
-    ];
-    if model.input_delays.iter().any(|d| *d > 0) {
-        let delays: Vec<String> = model.input_delays.iter().map(usize::to_string).collect();
-        facts.push(("Input delays, in samples", delays.join(", ")));
+    let mut facts = vec![];
+    if let Some(model) = &of.model {
+        facts.extend([
+            ("Inputs", channels(&model.inputs)),
+            ("Outputs", channels(&model.outputs)),
+            ("Sample time", with_unit(&exact(model.sample_time), "s")),
+            ("States of the model", model.a.0.nrows().to_string()),
+        ]);
+        if model.input_delays.iter().any(|d| *d > 0) {
+            let delays: Vec<String> = model.input_delays.iter().map(usize::to_string).collect();
+            facts.push(("Input delays, in samples", delays.join(", ")));
+        }
+        if model.reference.is_some() {
+            facts.push(("Simulator", "known by its outputs alone".to_owned()));
+        }
     }
-    if model.reference.is_some() {
-        facts.push(("Simulator", "known by its outputs alone".to_owned()));
+    if of.plant.is_some() {
+        facts.push(("Simulator", "a plant in equations".to_owned()));
     }
     facts.push(("Written by", format!("innovant {}", of.version)));
     facts.push(("Format of the document", of.format.clone()));

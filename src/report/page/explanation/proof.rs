@@ -113,7 +113,11 @@ pub(super) fn proof(of: &Explanation) -> Proof {
 /// Unit of the output that the figures are of.
 fn unit(of: &Explanation) -> String {
     let traced = of.signals.iter().find(|s| s.output == of.fit.output);
-    let modelled = of.model.outputs.iter().find(|c| c.name == of.fit.output);
+    let modelled = of
+        .model
+        .iter()
+        .flat_map(|m| &m.outputs)
+        .find(|c| c.name == of.fit.output);
     traced
         .map(|s| s.unit.clone())
         .or_else(|| modelled.and_then(|c| c.unit.clone()))

@@ -1,0 +1,157 @@
+//! What a missing term may be a function of, with its values along the recordings.
+
+use crate::physics::{ModelSpec, VariableId, VariableKind};
+
+use super::library::Needs;
+
+/// An expression of the plant's variables.
+#[derive(Debug, Clone)]
+pub(crate) struct Argument {
+    pub expression: String,
+    pub variables: Vec<VariableId>,
+    /// Place of the equation behind which all of it is known; none where states and inputs are enough.
+    pub known_after: Option<usize>,
+    pub temperature: bool,
+    pub difference: bool,
+    pub product: bool,
+    pub angle: bool,
+    /// Changes at samples only: it is made of inputs.
+    pub held: bool,
+    /// Values along each recording.
+    pub values: Vec<Vec<f64>>,
+    sorted: Vec<f64>,
+}
+
+/// Samples that quantiles are taken of.
+const SORTED: usize = 4000;
+
+impl Argument {
+    fn new(spec: &ModelSpec, expression: String, variables: Vec<VariableId>) -> Self {
+        let known_after = variables
+            .iter()
+            .filter(|&&v| spec.variable(v).kind == VariableKind::Algebraic)
+            .filter_map(|&v| {
+                spec.equations
+                    .iter()
+                    .position(|e| e.unknown.variable() == v)
+            })
+            .max();
+        let unit = |v: VariableId| spec.variable(v).unit_text.as_deref().unwrap_or("");
+        let held = variables
+            .iter()
+            .all(|&v| spec.variable(v).kind == VariableKind::Input);
+        Self {
+            temperature: variables.len() == 1 && matches!(unit(variables[0]), "K" | "degC"),
+            angle: variables.len() == 1 && unit(variables[0]) == "rad",
+            difference: false,
+            product: false,
+            held,
+            expression,
+            variables,
+            known_after,
+            values: Vec::new(),
+            sorted: Vec::new(),
+        }
+    }
+
+    /// Takes over the values.
+    pub fn set(&mut self, values: Vec<Vec<f64>>) {
+        let all: Vec<f64> = values.iter().flatten().copied().collect();
+        let every = (all.len() / SORTED).max(1);
+        self.sorted = all.into_iter().step_by(every).collect();
+        self.sorted.sort_by(f64::total_cmp);
+        self.values = values;
+    }
+
+    /// The value below which this part of all values lies.
+    pub fn quantile(&self, part: f64) -> f64 {
+        let last = self.sorted.len().saturating_sub(1);
+        let at = (part * last as f64).round() as usize;
+        self.sorted.get(at.min(last)).copied().unwrap_or(0.0)
+    }
+
+    /// The same of the absolute values.
+    pub fn size_quantile(&self, part: f64) -> f64 {
+        let mut sizes: Vec<f64> = self.sorted.iter().map(|v| v.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        let last = sizes.len().saturating_sub(1);
+        let at = (part * last as f64).round() as usize;
+        sizes.get(at.min(last)).copied().unwrap_or(0.0)
+    }
+
+    pub fn range(&self) -> f64 {
+        self.quantile(1.0) - self.quantile(0.0)
+    }
+
+    pub fn spread(&self) -> f64 {
+        let n = self.sorted.len().max(1) as f64;
+        let mean = self.sorted.iter().sum::<f64>() / n;
+        (self.sorted.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+    }
+
+    /// Whether a term can be a function of it.
+    pub fn serves(&self, needs: Needs) -> bool {
+        if self.product {
+            return false;
+        }
+        let both = self.quantile(0.05) < 0.0 && self.quantile(0.95) > 0.0;
+        match needs {
+            Needs::Anything => true,
+            Needs::BothSigns => both,
+            Needs::Positive => self.quantile(0.0) >= 0.0,
+            Needs::Temperature => self.temperature,
+            Needs::Difference => self.difference,
+            Needs::Angle => self.angle && self.range() > std::f64::consts::PI,
+            Needs::Time => false,
+        }
+    }
+}
+
+/// Variables of the plant that something may depend on, differences of two of one unit, and products of states and inputs.
+pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
+    let name = |v: VariableId| spec.variable(v).name.clone();
+    let simple: Vec<VariableId> = [
+        VariableKind::State,
+        VariableKind::Input,
+        VariableKind::Algebraic,
+    ]
+    .into_iter()
+    .flat_map(|kind| spec.of_kind(kind).collect::<Vec<_>>())
+    .collect();
+    // What only copies another variable is that variable.
+    let copies = |v: VariableId| {
+        spec.equations.iter().any(|e| {
+            e.unknown.variable() == v
+                && spec.variable(v).kind == VariableKind::Algebraic
+                && e.coefficient.is_none()
+                && matches!(
+                    spec.expressions.node(e.rest),
+                    crate::physics::Node::Variable(_)
+                )
+        })
+    };
+    let simple: Vec<VariableId> = simple.into_iter().filter(|&v| !copies(v)).collect();
+    let mut found: Vec<Argument> = simple
+        .iter()
+        .map(|&v| Argument::new(spec, name(v), vec![v]))
+        .collect();
+    let source = |v: VariableId| spec.variable(v).kind != VariableKind::Algebraic;
+    for (i, &a) in simple.iter().enumerate() {
+        for &b in &simple[i + 1..] {
+            let unit = |v: VariableId| spec.variable(v).unit_text.clone();
+            if unit(a).is_some() && unit(a) == unit(b) && source(a) && source(b) {
+                let text = format!("({} - {})", name(a), name(b));
+                let mut difference = Argument::new(spec, text, vec![a, b]);
+                difference.difference = true;
+                found.push(difference);
+            }
+            if source(a) && source(b) {
+                let text = format!("{}*{}", name(a), name(b));
+                let mut product = Argument::new(spec, text, vec![a, b]);
+                product.product = true;
+                found.push(product);
+            }
+        }
+    }
+    found
+}

@@ -1,0 +1,169 @@
+//! A lead made into a plant that can be fitted.
+
+use super::argument::Argument;
+use super::edit::{Edit, NewParameter, Place, literal};
+use super::library::{Port, Starts};
+use super::screen::{Lead, filled, memory_start};
+use crate::physics::estimate::{Fit, Form, PlantRecording};
+use crate::physics::{ModelSpec, Plant};
+
+/// A plant with a term more.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate {
+    pub plant: Plant,
+    /// Names of the new parameters.
+    pub names: Vec<String>,
+    /// Values that they start from.
+    pub values: Vec<f64>,
+    pub new_states: usize,
+    /// What stands at the place now.
+    pub equation: String,
+}
+
+/// A name that the plant does not have.
+fn free_name(spec: &ModelSpec, wanted: &str) -> String {
+    let mut name = wanted.to_owned();
+    let mut n = 1;
+    while spec.find(&name).is_some() || spec.find(&format!("{name}_acting")).is_some() {
+        n += 1;
+        name = format!("{wanted}{n}");
+    }
+    name
+}
+
+/// The plant with the lead's term in it.
+pub(crate) fn candidate(
+    spec: &ModelSpec,
+    lead: &Lead,
+    arguments: &[Argument],
+    recordings: &[PlantRecording],
+) -> Option<Candidate> {
+    let term = lead.term;
+    let h = recordings.first()?.sample_time;
+    let argument = lead.argument.map(|a| &arguments[a]);
+    let mut edit = Edit::default();
+    let mut values = Vec::new();
+    let mut shapes = Vec::new();
+    for (shape, &value) in term.shapes.iter().zip(&lead.shapes) {
+        let name = free_name(spec, &format!("{}_{}", term.id, shape.symbol));
+        let (min, max) = match shape.starts {
+            Starts::Length(_) if !shape.positive => {
+                let length = recordings.iter().map(|r| r.outputs[0].len()).max()? as f64 * h;
+                let begin = recordings.first()?.start_time;
+                (begin, begin + length)
+            }
+            Starts::Samples(_) if term.form.contains("delay") => (0.0, 100.0 * value + h),
+            _ if shape.positive => (1e-3 * value, f64::INFINITY),
+            _ => (f64::NEG_INFINITY, f64::INFINITY),
+        };
+        edit.parameters.push(NewParameter {
+            name: name.clone(),
+            value,
+            min,
+            max,
+            description: String::new(),
+        });
+        values.push(value);
+        shapes.push(name);
+    }
+    // The argument: for a sensor what it shows, for an input the input itself.
+    let text = match (argument, lead.place) {
+        (None, _) => String::new(),
+        (Some(_), Place::Equation(_)) if lead.sensor => "{v}".to_owned(),
+        (Some(a), _) => a.expression.clone(),
+    };
+    let memory = free_name(spec, &format!("{}_state", term.id));
+    let body = filled(term.form, term, &text, &memory, &shapes, h);
+    let mut new_states = 0;
+    if let Some(rate) = term.memory {
+        let first = argument.map_or(0.0, |a| a.values[0][0]);
+        let first = memory_start(term, first);
+        let source = if lead.sensor {
+            let Place::Equation(at) = lead.place else {
+                return None;
+            };
+            let right = spec.expressions.span(spec.equations[at].right);
+            format!("({})", &spec.text[right.start..right.end])
+        } else {
+            text.clone()
+        };
+        edit.declarations.push(format!(
+            "Real {memory}(start={}, fixed=true);",
+            literal(first)
+        ));
+        edit.equations.push(format!(
+            "der({memory}) = {};",
+            filled(rate, term, &source, &memory, &shapes, h)
+        ));
+        new_states = 1;
+    }
+    let added = if term.free_strength {
+        let name = free_name(spec, &format!("{}_{}", term.id, term.symbol));
+        edit.parameters.push(NewParameter {
+            name: name.clone(),
+            value: lead.strength,
+            min: f64::NEG_INFINITY,
+            max: f64::INFINITY,
+            description: String::new(),
+        });
+        values.push(lead.strength);
+        format!("{name}*({body})")
+    } else {
+        format!("({body})")
+    };
+    debug_assert!(!(lead.sensor && term.port != Port::Sensor));
+    edit.changes.push((lead.place, format!("{{v}} + {added}")));
+    let changed = edit.apply(spec).ok()?;
+    let names = edit.parameters.iter().map(|p| p.name.clone()).collect();
+    Some(Candidate {
+        equation: equation_text(&changed, spec, lead.place),
+        plant: Plant::new(changed),
+        names,
+        values,
+        new_states,
+    })
+}
+
+/// The changed equation as it stands in the new text.
+fn equation_text(changed: &ModelSpec, spec: &ModelSpec, place: Place) -> String {
+    let variable = place.variable(spec);
+    let name = match place {
+        Place::Equation(_) => spec.variable(variable).name.clone(),
+        Place::Input(_) | Place::Parameter(_) => {
+            format!("{}_acting", spec.variable(variable).column())
+        }
+    };
+    let equation = changed
+        .equations
+        .iter()
+        .find(|e| changed.variable(e.unknown.variable()).name == name);
+    equation.map_or(String::new(), |e| {
+        let left = changed.expressions.span(e.left);
+        let right = changed.expressions.span(e.right);
+        let part = |s: crate::physics::Span| changed.text[s.start..s.end].trim().to_owned();
+        format!("{} = {}", part(left), part(right))
+    })
+}
+
+impl Candidate {
+    /// The numbers of a fit of the plant without the term, with the term's.
+    pub fn from(&self, fit: &Fit, parameters: usize, states: usize, outputs: usize) -> Fit {
+        let gains = if fit.form == Form::Innovation {
+            states * outputs
+        } else {
+            0
+        };
+        let split = fit.point.len() - gains;
+        let mut point = fit.point[..parameters].to_vec();
+        point.extend(&self.values);
+        point.extend(&fit.point[parameters..split]);
+        point.extend(&fit.point[split..]);
+        if gains > 0 {
+            point.extend(std::iter::repeat_n(0.0, self.new_states * outputs));
+        }
+        Fit {
+            point,
+            ..fit.clone()
+        }
+    }
+}

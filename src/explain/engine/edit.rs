@@ -1,0 +1,347 @@
+//! Changes of a plant's text: terms that enter its equations, and the variables and parameters that they need.
+
+use crate::physics::{ModelSpec, Node, Span, SpecError, Unknown, VariableId, parse};
+
+/// Where something can enter the equations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Place {
+    /// The right-hand side of an equation, by its place in [`ModelSpec::equations`].
+    Equation(usize),
+    /// An input, on its way into every equation that uses it.
+    Input(VariableId),
+    /// A parameter, in every equation that uses it.
+    Parameter(VariableId),
+}
+
+impl Place {
+    /// The variable that is changed: whose derivative or value the equation determines, the input, or the parameter.
+    pub fn variable(self, spec: &ModelSpec) -> VariableId {
+        match self {
+            Self::Equation(at) => spec.equations[at].unknown.variable(),
+            Self::Input(v) | Self::Parameter(v) => v,
+        }
+    }
+}
+
+/// A parameter that a change brings along.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct NewParameter {
+    pub name: String,
+    pub value: f64,
+    pub min: f64,
+    pub max: f64,
+    pub description: String,
+}
+
+/// A change of the text.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Edit {
+    pub parameters: Vec<NewParameter>,
+    /// Declarations of other variables, each with its semicolon.
+    pub declarations: Vec<String>,
+    /// Further equations, each with its semicolon.
+    pub equations: Vec<String>,
+    /// What stands at a place instead; `{v}` is what stood there.
+    pub changes: Vec<(Place, String)>,
+}
+
+/// Spans of every use of a variable in the equations.
+fn uses(spec: &ModelSpec, variable: VariableId) -> Vec<Span> {
+    let mut spans = Vec::new();
+    for equation in &spec.equations {
+        let mut stack = vec![equation.left, equation.right];
+        while let Some(id) = stack.pop() {
+            let node = spec.expressions.node(id);
+            if node == Node::Variable(variable) {
+                spans.push(spec.expressions.span(id));
+            }
+            stack.extend(node.operands());
+        }
+    }
+    spans.sort_by_key(|s| s.start);
+    spans.dedup();
+    spans
+}
+
+/// A number as the language reads it back exactly.
+pub(crate) fn literal(value: f64) -> String {
+    if value.fract() == 0.0 && value.abs() < 1e15 {
+        format!("{value:.1}")
+    } else {
+        format!("{value:e}")
+    }
+}
+
+fn declaration(p: &NewParameter) -> String {
+    let mut attributes = Vec::new();
+    if p.min.is_finite() {
+        attributes.push(format!("min={}", literal(p.min)));
+    }
+    if p.max.is_finite() {
+        attributes.push(format!("max={}", literal(p.max)));
+    }
+    let attributes = if attributes.is_empty() {
+        String::new()
+    } else {
+        format!("({})", attributes.join(", "))
+    };
+    let description = if p.description.is_empty() {
+        String::new()
+    } else {
+        format!(" \"{}\"", p.description)
+    };
+    format!(
+        "  parameter Real {}{attributes} = {}{description};\n",
+        p.name,
+        literal(p.value)
+    )
+}
+
+/// Where the word `equation` and the last `end` stand.
+fn sections(text: &str) -> Option<(usize, usize)> {
+    let bytes = text.as_bytes();
+    let (mut at, mut equation, mut end) = (0, None, None);
+    while at < bytes.len() {
+        let rest = &text[at..];
+        let skipped = if rest.starts_with("//") {
+            rest.find('\n').unwrap_or(rest.len())
+        } else if rest.starts_with("/*") {
+            rest.find("*/").map_or(rest.len(), |i| i + 2)
+        } else if bytes[at] == b'"' {
+            let mut i = 1;
+            while i < rest.len() && rest.as_bytes()[i] != b'"' {
+                i += 1 + usize::from(rest.as_bytes()[i] == b'\\');
+            }
+            i + 1
+        } else if bytes[at].is_ascii_alphabetic() || bytes[at] == b'_' {
+            let word = rest
+                .find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
+                .unwrap_or(rest.len());
+            match &rest[..word] {
+                "equation" if equation.is_none() => equation = Some(at),
+                "end" => end = Some(at),
+                _ => {}
+            }
+            word
+        } else {
+            1
+        };
+        at += skipped.max(1);
+        while at < bytes.len() && !text.is_char_boundary(at) {
+            at += 1;
+        }
+    }
+    let end = end?;
+    Some((equation.unwrap_or(end), end))
+}
+
+impl Edit {
+    /// The text with the change.
+    pub fn text(&self, spec: &ModelSpec) -> String {
+        let text = &spec.text;
+        let mut declarations: String = self.parameters.iter().map(declaration).collect();
+        let mut equations = String::new();
+        // Replacements and where they go; nothing nests, because a place is changed once.
+        let mut replaced: Vec<(Span, String)> = Vec::new();
+        let mut renamed: Vec<(VariableId, String)> = Vec::new();
+        for (place, form) in &self.changes {
+            match *place {
+                Place::Equation(_) => {}
+                Place::Input(v) | Place::Parameter(v) => {
+                    let name = format!("{}_acting", spec.variable(v).column());
+                    declarations.push_str(&format!("  Real {name};\n"));
+                    let value = form.replace("{v}", &spec.variable(v).name);
+                    equations.push_str(&format!("  {name} = {value};\n"));
+                    renamed.push((v, name));
+                }
+            }
+        }
+        for (v, name) in &renamed {
+            replaced.extend(uses(spec, *v).into_iter().map(|s| (s, name.clone())));
+        }
+        for (place, form) in &self.changes {
+            if let Place::Equation(at) = *place {
+                let right = spec.expressions.span(spec.equations[at].right);
+                let inner: Vec<(Span, String)> = replaced
+                    .iter()
+                    .filter(|(s, _)| s.start >= right.start && s.end <= right.end)
+                    .cloned()
+                    .collect();
+                replaced.retain(|(s, _)| !(s.start >= right.start && s.end <= right.end));
+                let old = substituted(text, right, inner);
+                let old = if simple(&old) {
+                    old
+                } else {
+                    format!("({old})")
+                };
+                replaced.push((right, form.replace("{v}", &old)));
+            }
+        }
+        for d in &self.declarations {
+            declarations.push_str(&format!("  {d}\n"));
+        }
+        for e in &self.equations {
+            equations.push_str(&format!("  {e}\n"));
+        }
+        let Some((equation, end)) = sections(text) else {
+            return text.clone();
+        };
+        let head = if text[..end].contains("equation") && equation < end {
+            ""
+        } else {
+            "equation\n"
+        };
+        let at = |position| Span {
+            start: position,
+            end: position,
+        };
+        replaced.push((at(equation), declarations));
+        replaced.push((at(end), format!("{head}{equations}")));
+        let whole = Span {
+            start: 0,
+            end: text.len(),
+        };
+        substituted(text, whole, replaced)
+    }
+
+    /// The plant with the change.
+    pub fn apply(&self, spec: &ModelSpec) -> Result<ModelSpec, SpecError> {
+        parse(&self.text(spec))
+    }
+}
+
+/// Whether an expression needs no parentheses as a term of a sum.
+fn simple(text: &str) -> bool {
+    !text.trim_start().starts_with("if") && !text.contains("if ")
+}
+
+/// A part of the text with pieces of it replaced.
+fn substituted(text: &str, part: Span, mut pieces: Vec<(Span, String)>) -> String {
+    pieces.sort_by_key(|(s, _)| (s.start, s.end));
+    let (mut out, mut at) = (String::new(), part.start);
+    for (span, new) in pieces {
+        out.push_str(&text[at..span.start]);
+        out.push_str(&new);
+        at = span.end;
+    }
+    out.push_str(&text[at..part.end]);
+    out
+}
+
+/// Where effects may enter: every equation that is no definition and no plain sensor, every input, every parameter.
+pub(crate) fn places(spec: &ModelSpec) -> Vec<Place> {
+    let mut found = Vec::new();
+    for (at, equation) in spec.equations.iter().enumerate() {
+        let plain = equation.coefficient.is_none()
+            && matches!(spec.expressions.node(equation.rest), Node::Variable(_));
+        if !plain {
+            found.push(Place::Equation(at));
+        }
+    }
+    found.extend(
+        spec.inputs()
+            .into_iter()
+            .filter(|&v| !uses(spec, v).is_empty())
+            .map(Place::Input),
+    );
+    found.extend(spec.parameters().into_iter().map(Place::Parameter));
+    found
+}
+
+/// The variable whose equation uses a parameter first; the parameter itself where none does.
+pub(crate) fn user_of(spec: &ModelSpec, parameter: VariableId) -> VariableId {
+    let spans = uses(spec, parameter);
+    let inside = |at: Span| {
+        let right = spec.equations.iter().map(|e| {
+            (
+                e,
+                spec.expressions.span(e.left),
+                spec.expressions.span(e.right),
+            )
+        });
+        right
+            .filter(|(_, left, right)| left.start <= at.start && at.end <= right.end)
+            .map(|(e, ..)| e.unknown.variable())
+            .next()
+    };
+    spans.into_iter().find_map(inside).unwrap_or(parameter)
+}
+
+/// The output equations that copy a variable: `y = T`.
+pub(crate) fn sensors(spec: &ModelSpec) -> Vec<usize> {
+    (0..spec.equations.len())
+        .filter(|&at| {
+            let e = &spec.equations[at];
+            matches!(e.unknown, Unknown::Value(v) if spec.variable(v).output && uses(spec, v).len() == 1)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TANK: &str = "model Tank // an equation of its own
+  parameter Real A = 2; parameter Real a(min=0) = 0.3 \"outlet; equation\"; input Real u; output Real y;
+  Real h(start=0.5); Real q = a*sqrt(max(h, 0));
+equation
+  A*der(h) = u - q; /* equation */ y = h + 0*u;
+end Tank;
+";
+
+    fn term(place: Place, form: &str) -> Edit {
+        Edit {
+            changes: vec![(place, form.to_owned())],
+            parameters: vec![NewParameter {
+                name: "c".to_owned(),
+                value: 0.25,
+                min: 0.0,
+                max: f64::INFINITY,
+                description: "new".to_owned(),
+            }],
+            ..Edit::default()
+        }
+    }
+
+    #[test]
+    fn every_place_can_be_changed() {
+        let spec = parse(TANK).unwrap();
+        let places = places(&spec);
+        assert_eq!(places.len(), 6, "{places:?}");
+        for place in places {
+            let edit = term(place, "{v} + c*1.0");
+            let changed = edit
+                .apply(&spec)
+                .unwrap_or_else(|e| panic!("{}\n{e}", edit.text(&spec)));
+            assert_eq!(changed.parameters().len(), 3);
+            assert_eq!(changed.states().len(), 1);
+        }
+    }
+
+    #[test]
+    fn a_change_stands_where_it_should() {
+        let spec = parse(TANK).unwrap();
+        let input = spec.find("u").unwrap();
+        let text = term(Place::Input(input), "c*({v})").text(&spec);
+        assert!(text.contains("A*der(h) = u_acting - q;"), "{text}");
+        assert!(text.contains("y = h + 0*u_acting;"), "{text}");
+        assert!(text.contains("u_acting = c*(u);"), "{text}");
+        let at = spec
+            .equations
+            .iter()
+            .position(|e| spec.variable(e.unknown.variable()).name == "q");
+        let text = term(Place::Equation(at.unwrap()), "{v} + c*h").text(&spec);
+        assert!(text.contains("Real q = a*sqrt(max(h, 0)) + c*h;"), "{text}");
+        assert_eq!(
+            user_of(&spec, spec.find("a").unwrap()),
+            spec.find("q").unwrap()
+        );
+    }
+
+    #[test]
+    fn numbers_are_read_back_exactly() {
+        for value in [0.0, -3.0, 1e20, 0.1, f64::MIN_POSITIVE, -1.0 / 3.0] {
+            assert_eq!(literal(value).parse::<f64>().unwrap(), value);
+        }
+    }
+}

@@ -1,0 +1,354 @@
+//! The effects as data: terms in the language of the plants, what they may enter, and what they are called there.
+
+/// What a term may enter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Port {
+    /// An equation: a function of variables of the plant is added to its right-hand side.
+    Equation,
+    /// An input, as a function of itself.
+    Input,
+    /// A sensor, as a function of what it shows.
+    Sensor,
+    /// A parameter, as a function of variables of the plant.
+    Parameter,
+}
+
+/// What the argument of a term must be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Needs {
+    /// Nothing.
+    Anything,
+    /// Both signs occur.
+    BothSigns,
+    /// Never below zero.
+    Positive,
+    /// A temperature.
+    Temperature,
+    /// A difference of two variables of one unit.
+    Difference,
+    /// An angle that covers half a turn or more.
+    Angle,
+    /// No argument: a function of time alone.
+    Time,
+}
+
+/// Where the search for a number that shapes a term starts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Starts {
+    /// Quantiles of the argument.
+    Quantiles(&'static [f64]),
+    /// Quantiles of the size of the argument.
+    SizeQuantiles(&'static [f64]),
+    /// Parts of the argument's standard deviation.
+    Spread(&'static [f64]),
+    /// Parts of its inverse: wave numbers `2 pi n / range`.
+    Waves(&'static [f64]),
+    /// Parts of the recording's length.
+    Length(&'static [f64]),
+    /// Numbers of samples.
+    Samples(&'static [f64]),
+    /// As they stand.
+    Values(&'static [f64]),
+}
+
+/// A number that shapes a term.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Shape {
+    /// As in the form: `c` for `{c}`.
+    pub symbol: &'static str,
+    pub starts: Starts,
+    /// True when only positive values make sense.
+    pub positive: bool,
+}
+
+/// A term.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Term {
+    /// Id where nothing more is known of the place; see [`named`](super::names::named).
+    pub id: &'static str,
+    pub port: Port,
+    pub needs: Needs,
+    /// Function of `{z}`, of the shapes, and of the memory `{m}`; the strength is its factor.
+    pub form: &'static str,
+    /// `d{m}/dt`, where the term has a memory; it starts at `{z}`'s first value times this.
+    pub memory: Option<&'static str>,
+    pub shapes: &'static [Shape],
+    /// False when the size of the term is fixed by its shapes: `{v}` becomes the form itself.
+    pub free_strength: bool,
+    /// Symbol of its strength.
+    pub symbol: &'static str,
+}
+
+const fn shape(symbol: &'static str, starts: Starts, positive: bool) -> Shape {
+    Shape {
+        symbol,
+        starts,
+        positive,
+    }
+}
+
+const fn curve(
+    id: &'static str,
+    port: Port,
+    needs: Needs,
+    form: &'static str,
+    shapes: &'static [Shape],
+) -> Term {
+    Term {
+        id,
+        port,
+        needs,
+        form,
+        memory: None,
+        shapes,
+        free_strength: true,
+        symbol: "c",
+    }
+}
+
+const ABOVE: &[f64] = &[0.5, 0.7, 0.85, 0.95];
+const BELOW: &[f64] = &[0.5, 0.3, 0.15, 0.05];
+const TIMES: &[f64] = &[
+    0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85,
+    0.9, 0.95,
+];
+
+use Needs::{Angle, Anything, BothSigns, Difference, Positive, Temperature, Time};
+use Port::{Equation, Input, Parameter, Sensor};
+
+/// The library.
+pub(crate) const TERMS: &[Term] = &[
+    curve("linear", Equation, Anything, "{z}", &[]),
+    curve("square", Equation, Anything, "{z}^2", &[]),
+    curve("signed_square", Equation, BothSigns, "{z}*abs({z})", &[]),
+    curve("cube", Equation, Anything, "{z}^3", &[]),
+    curve("root", Equation, Positive, "sqrt(max({z}, 0))", &[]),
+    curve(
+        "friction",
+        Equation,
+        BothSigns,
+        "tanh({z}/{w})",
+        &[shape("w", Starts::Spread(&[0.02, 0.1]), true)],
+    ),
+    curve(
+        "stribeck",
+        Equation,
+        BothSigns,
+        "tanh({z}/{w})*exp(-abs({z})/{vs})",
+        &[
+            shape("w", Starts::Spread(&[0.02]), true),
+            shape("vs", Starts::Spread(&[0.1, 0.3, 0.8]), true),
+        ],
+    ),
+    curve("one_sided", Equation, BothSigns, "max({z}, 0)", &[]),
+    curve(
+        "above",
+        Equation,
+        Anything,
+        "max({z} - {c}, 0)",
+        &[shape("c", Starts::Quantiles(ABOVE), false)],
+    ),
+    curve(
+        "below",
+        Equation,
+        Anything,
+        "min({z} - {c}, 0)",
+        &[shape("c", Starts::Quantiles(BELOW), false)],
+    ),
+    curve(
+        "both_sides",
+        Equation,
+        BothSigns,
+        "max({z} - {c}, 0) + min({z} + {c}, 0)",
+        &[shape(
+            "c",
+            Starts::SizeQuantiles(&[0.5, 0.7, 0.85, 0.95]),
+            true,
+        )],
+    ),
+    curve(
+        "root_above",
+        Equation,
+        Anything,
+        "sqrt(max({z} - {c}, 0))",
+        &[shape(
+            "c",
+            Starts::Quantiles(&[0.3, 0.5, 0.7, 0.85, 0.95]),
+            false,
+        )],
+    ),
+    curve(
+        "sine",
+        Equation,
+        Angle,
+        "sin({k}*{z} + {p})",
+        &[
+            shape(
+                "k",
+                Starts::Waves(&[
+                    1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0,
+                ]),
+                true,
+            ),
+            shape(
+                "p",
+                Starts::Values(&[0.0, std::f64::consts::FRAC_PI_2]),
+                false,
+            ),
+        ],
+    ),
+    curve("radiation", Equation, Temperature, "{z}^4", &[]),
+    curve(
+        "natural_convection",
+        Equation,
+        Difference,
+        "{z}*abs({z})^0.25",
+        &[],
+    ),
+    curve("load_constant", Equation, Time, "1.0", &[]),
+    curve("load_ramp", Equation, Time, "time", &[]),
+    curve(
+        "load_step",
+        Equation,
+        Time,
+        "(if time > {t0} then 1.0 else 0.0)",
+        &[shape("t0", Starts::Length(TIMES), false)],
+    ),
+    curve("parameter_curve", Parameter, Anything, "{z}", &[]),
+    curve("parameter_square", Parameter, Anything, "{z}^2", &[]),
+    curve(
+        "parameter_step",
+        Parameter,
+        Time,
+        "(if time > {t0} then 1.0 else 0.0)",
+        &[shape("t0", Starts::Length(TIMES), false)],
+    ),
+    curve("parameter_ramp", Parameter, Time, "time", &[]),
+    Term {
+        id: "parameter_heating",
+        port: Parameter,
+        needs: Anything,
+        form: "{m}",
+        memory: Some("({z}^2 - {m})/{T}"),
+        shapes: &[shape("T", Starts::Length(&[0.02, 0.1, 0.4]), true)],
+        free_strength: true,
+        symbol: "c",
+    },
+    Term {
+        id: "input_saturation",
+        port: Input,
+        needs: BothSigns,
+        form: "min(max({z}, -{L}), {L}) - {z}",
+        memory: None,
+        shapes: &[shape(
+            "L",
+            Starts::SizeQuantiles(&[0.6, 0.8, 0.9, 0.97]),
+            true,
+        )],
+        free_strength: false,
+        symbol: "",
+    },
+    Term {
+        id: "input_saturation",
+        port: Input,
+        needs: Anything,
+        form: "min({z}, {L}) - {z}",
+        memory: None,
+        shapes: &[shape("L", Starts::Quantiles(&[0.6, 0.8, 0.9, 0.97]), false)],
+        free_strength: false,
+        symbol: "",
+    },
+    Term {
+        id: "input_saturation",
+        port: Input,
+        needs: Anything,
+        form: "max({z}, {L}) - {z}",
+        memory: None,
+        shapes: &[shape("L", Starts::Quantiles(&[0.4, 0.2, 0.1, 0.03]), false)],
+        free_strength: false,
+        symbol: "",
+    },
+    Term {
+        id: "input_dead_zone",
+        port: Input,
+        needs: BothSigns,
+        form: "-min(max({z}, -{d}), {d})",
+        memory: None,
+        shapes: &[shape("d", Starts::SizeQuantiles(&[0.1, 0.3, 0.5]), true)],
+        free_strength: false,
+        symbol: "",
+    },
+    curve("input_asymmetry", Input, BothSigns, "max({z}, 0)", &[]),
+    curve("input_square", Input, Anything, "{z}^2", &[]),
+    curve("input_cube", Input, Anything, "{z}^3", &[]),
+    Term {
+        id: "input_delay",
+        port: Input,
+        needs: Anything,
+        form: "delay({z}, {T}) - {z}",
+        memory: None,
+        shapes: &[shape(
+            "T",
+            Starts::Samples(&[0.5, 1.0, 2.0, 4.0, 8.0]),
+            true,
+        )],
+        free_strength: false,
+        symbol: "",
+    },
+    Term {
+        id: "actuator_lag",
+        port: Input,
+        needs: Anything,
+        form: "{m} - {z}",
+        memory: Some("({z} - {m})/{T}"),
+        shapes: &[shape("T", Starts::Samples(&[0.5, 2.0, 6.0, 20.0]), true)],
+        free_strength: false,
+        symbol: "",
+    },
+    Term {
+        id: "input_backlash",
+        port: Input,
+        needs: Anything,
+        form: "{m} - {z}",
+        memory: Some("(max({z} - {g} - {m}, 0) + min({z} + {g} - {m}, 0))*{fast}"),
+        shapes: &[shape("g", Starts::Spread(&[0.02, 0.1, 0.3]), true)],
+        free_strength: false,
+        symbol: "",
+    },
+    Term {
+        id: "input_rate_limit",
+        port: Input,
+        needs: Anything,
+        form: "{m} - {z}",
+        memory: Some("min(max(({z} - {m})*{fast}, -{R}), {R})"),
+        shapes: &[shape("R", Starts::Samples(&[0.02, 0.1, 0.3]), true)],
+        free_strength: false,
+        symbol: "",
+    },
+    curve("sensor_offset", Sensor, Time, "1.0", &[]),
+    curve("sensor_drift", Sensor, Time, "time", &[]),
+    curve("sensor_scale", Sensor, Anything, "{z}", &[]),
+    Term {
+        id: "sensor_lag",
+        port: Sensor,
+        needs: Anything,
+        form: "{m} - {z}",
+        memory: Some("({z} - {m})/{T}"),
+        shapes: &[shape("T", Starts::Samples(&[0.5, 2.0, 6.0, 20.0]), true)],
+        free_strength: false,
+        symbol: "",
+    },
+    Term {
+        id: "sensor_saturation",
+        port: Sensor,
+        needs: Anything,
+        form: "min(max({z}, {lower}), {upper}) - {z}",
+        memory: None,
+        shapes: &[
+            shape("lower", Starts::Quantiles(&[0.03, 0.1, 0.0]), false),
+            shape("upper", Starts::Quantiles(&[0.97, 0.9, 1.0]), false),
+        ],
+        free_strength: false,
+        symbol: "",
+    },
+];

@@ -1,0 +1,269 @@
+//! From score tests to fits: candidates are fitted one by one, ranked by one criterion, and added one after the other.
+
+use rayon::prelude::*;
+
+use super::candidate::{Candidate, candidate};
+use super::library::Starts;
+use super::names::{named, rank};
+use super::screen::{Lead, Screen, screen};
+use crate::physics::estimate::{
+    Effort, EstimateError, EstimateOptions, Fit, PlantRecording, Study,
+};
+use crate::physics::{Hold, Plant};
+
+/// Leads of each screen that are fitted with the noise of the fit before.
+const GLANCED: usize = 24;
+/// ... of them at most so many of one kind and at one place.
+const OF_A_KIND: usize = 3;
+const AT_A_PLACE: usize = 8;
+const GLANCE: Effort = Effort {
+    iterations: 8,
+    settled: 0.3,
+};
+/// The best of these are fitted with a noise model of their own.
+const FITTED: usize = 8;
+const THOROUGH: Effort = Effort {
+    iterations: 20,
+    settled: 0.05,
+};
+const ROUNDS: usize = 3;
+/// Gain in Schwarz's criterion that is needed, beyond the penalty for what was searched: odds of e^8 (math/physics.md).
+pub(crate) const NEEDED: f64 = 16.0;
+/// A second effect must gain more, and at least this part of the first.
+const SECOND: (f64, f64) = (30.0, 0.12);
+/// Gains that differ by less, or by this part of the best, are equal.
+const TIE: (f64, f64) = (6.0, 0.08);
+/// Most effects that are named.
+const MOST: usize = 2;
+
+/// A candidate that was fitted.
+#[derive(Debug, Clone)]
+pub(crate) struct Fitted {
+    pub lead: Lead,
+    /// What the term is a function of.
+    pub depends: Vec<String>,
+    /// Values that the argument had.
+    pub range: (f64, f64),
+    pub candidate: Candidate,
+    pub fit: Fit,
+    /// Gain in the criterion over the plant without it, less the penalty of the search.
+    pub gain: f64,
+}
+
+/// What the search has found.
+pub(crate) struct Found {
+    pub baseline: Fit,
+    /// Effects in the order in which they were added, each with its rivals, best first.
+    pub steps: Vec<Vec<Fitted>>,
+    /// The strongest test at the end, and how many there were.
+    pub left: (f64, usize),
+    /// The plant with everything that was accepted, its fit, and the covariance of its numbers.
+    pub plant: Plant,
+    pub fit: Fit,
+    pub accepted: usize,
+    pub options: EstimateOptions,
+}
+
+/// Penalty for the values of a shape that were searched.
+fn searched(lead: &Lead, recordings: &[PlantRecording]) -> f64 {
+    let samples = recordings.iter().map(|r| r.outputs[0].len()).sum::<usize>() as f64;
+    lead.term
+        .shapes
+        .iter()
+        .map(|shape| match shape.starts {
+            Starts::Length(_) => 2.0 * (samples / 20.0).ln(),
+            Starts::Waves(_) => 7.0,
+            Starts::Quantiles(_) | Starts::SizeQuantiles(_) => 2.5,
+            Starts::Spread(_) | Starts::Samples(_) => 2.0,
+            Starts::Values(_) => 0.0,
+        })
+        .sum()
+}
+
+fn promising(screen: &Screen) -> Vec<Lead> {
+    let mut kept: Vec<Lead> = Vec::new();
+    for lead in &screen.leads {
+        let kind = |l: &&Lead| l.term == lead.term;
+        let same =
+            |l: &Lead| l.term == lead.term && l.place == lead.place && l.argument == lead.argument;
+        let place = |l: &&Lead| l.place == lead.place;
+        if kept.iter().any(same)
+            || kept.iter().filter(kind).count() >= OF_A_KIND
+            || kept.iter().filter(place).count() >= AT_A_PLACE
+        {
+            continue;
+        }
+        kept.push(lead.clone());
+        if kept.len() == GLANCED {
+            break;
+        }
+    }
+    kept
+}
+
+/// Fits the leads of a plant; best first.
+fn step(
+    plant: &Plant,
+    study: &Study,
+    fit: &Fit,
+    recordings: &[PlantRecording],
+    options: &EstimateOptions,
+) -> (Vec<Fitted>, (f64, usize)) {
+    let states = plant.spec.states().len();
+    let parameters = study.parameters();
+    let outputs = study.outputs();
+    let mut tried: Vec<(Screen, Fit)> = Vec::new();
+    if let Some(s) = screen(study, fit, recordings) {
+        tried.push((s, fit.clone()));
+    }
+    let strongest = tried.first().map_or((0.0, 0), |(s, _)| {
+        (s.leads.first().map_or(0.0, |l| l.statistic), s.leads.len())
+    });
+    // A noise model that was fitted where physics is missing absorbs it: the same again under white noise.
+    if let Some(white) = study.least_squares(&fit.point)
+        && let Some(s) = screen(study, &white, recordings)
+    {
+        tried.push((s, white));
+    }
+    let mut glanced: Vec<(f64, Lead, usize, Candidate, Fit)> = tried
+        .iter()
+        .enumerate()
+        .flat_map(|(i, (screen, from))| {
+            promising(screen)
+                .into_iter()
+                .map(move |lead| (i, screen, from, lead))
+        })
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .filter_map(|(i, screen, from, lead)| {
+            let made = candidate(&plant.spec, &lead, &screen.arguments, recordings)?;
+            let options = with_more(options, made.values.len());
+            let inner = Study::new(&made.plant, recordings, &options).ok()?;
+            let start = made.from(from, parameters, states, outputs);
+            let fitted = inner.refit(&start, 0, GLANCE)?;
+            Some((from.deviance - fitted.deviance, lead, i, made, fitted))
+        })
+        .collect();
+    glanced.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut chosen: Vec<(Lead, usize, Candidate, Fit)> = Vec::new();
+    for which in 0..tried.len() {
+        let best = glanced.iter().filter(|g| g.2 == which).take(FITTED);
+        chosen.extend(best.map(|g| (g.1.clone(), g.2, g.3.clone(), g.4.clone())));
+    }
+    let mut fitted: Vec<Fitted> = chosen
+        .into_par_iter()
+        .filter_map(|(lead, which, made, from)| {
+            let arguments = &tried[which].0.arguments;
+            let options = with_more(options, made.values.len());
+            let inner = Study::new(&made.plant, recordings, &options).ok()?;
+            let from = Fit {
+                form: fit.form,
+                point: if from.form == fit.form {
+                    from.point
+                } else {
+                    // From free run to the observer of the fit before.
+                    let mut point = from.point;
+                    let gains = states * outputs;
+                    point.extend(&fit.point[fit.point.len() - gains..]);
+                    point.extend(std::iter::repeat_n(0.0, made.new_states * outputs));
+                    point
+                },
+                ..from
+            };
+            let best = inner.refit(&from, ROUNDS, THOROUGH)?;
+            let gain = fit.criterion - best.criterion - searched(&lead, recordings);
+            let argument = lead.argument.map(|a| &arguments[a]);
+            Some(Fitted {
+                depends: argument.map_or_else(Vec::new, |a| {
+                    a.variables
+                        .iter()
+                        .map(|&v| plant.spec.variable(v).name.clone())
+                        .collect()
+                }),
+                range: argument.map_or((0.0, 0.0), |a| (a.quantile(0.0), a.quantile(1.0))),
+                lead,
+                candidate: made,
+                fit: best,
+                gain,
+            })
+        })
+        .collect();
+    fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    // Among those that explain the recording as well as the best, the one with a name of its own comes first.
+    if let Some(best) = fitted.first().map(|f| f.gain) {
+        let tie = TIE.0.max(TIE.1 * best);
+        let ties = fitted.iter().take_while(|f| best - f.gain <= tie).count();
+        fitted[..ties].sort_by_key(|f| rank(&plant.spec, f));
+    }
+    (fitted, strongest)
+}
+
+fn with_more(options: &EstimateOptions, count: usize) -> EstimateOptions {
+    let mut options = options.clone();
+    options.free.extend(std::iter::repeat_n(true, count));
+    options
+}
+
+/// What the equations leave out.
+///
+/// # Errors
+/// As those of an estimation.
+pub(crate) fn search(
+    plant: &Plant,
+    recordings: &[PlantRecording],
+    hold: Hold,
+) -> Result<Found, EstimateError> {
+    let mut options = EstimateOptions {
+        free: vec![true; plant.spec.parameters().len()],
+        hold,
+        form: None,
+        least_squares: false,
+    };
+    let study = Study::new(plant, recordings, &options)?;
+    let baseline = study.fit(None)?;
+    let mut steps: Vec<Vec<Fitted>> = Vec::new();
+    let mut now = plant.clone();
+    let mut fit = baseline.clone();
+    let mut left = (0.0, 0);
+    let mut accepted_so_far = 0;
+    for count in 0..=MOST {
+        let study = Study::new(&now, recordings, &options)?;
+        let (fitted, strongest) = step(&now, &study, &fit, recordings, &options);
+        left = strongest;
+        let needed = match steps.first().and_then(|s| s.first()) {
+            None => NEEDED,
+            Some(first) => SECOND.0.max(SECOND.1 * first.gain),
+        };
+        // What comes second must have a name of its own, and not that of the first: a function without a name may be what is
+        // left of the first.
+        let first = steps.first().and_then(|s| s.first());
+        let new = |f: &&Fitted| {
+            first.is_none_or(|first| {
+                let id = named(&now.spec, f);
+                !matches!(id, "law" | "cross_coupling") && id != named(&plant.spec, first)
+            })
+        };
+        let best = fitted.first().filter(new);
+        let accepted = best.filter(|f| f.gain > needed && count < MOST).cloned();
+        let Some(best) = accepted else {
+            if steps.is_empty() {
+                steps.push(fitted);
+            }
+            break;
+        };
+        options = with_more(&options, best.candidate.values.len());
+        now = best.candidate.plant.clone();
+        fit = best.fit.clone();
+        steps.push(fitted);
+        accepted_so_far += 1;
+    }
+    Ok(Found {
+        baseline,
+        steps,
+        left,
+        plant: now,
+        fit,
+        accepted: accepted_so_far,
+        options,
+    })
+}
