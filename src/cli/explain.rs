@@ -8,6 +8,7 @@ use super::align::aligned;
 use super::output::{Output, check_distinct, note, paths, print};
 use super::plant::{is_plant_file, load, read_recordings, tell_warnings};
 use super::roles::{RoleFlags, tell_reading};
+use super::structure::HoldFlag;
 use super::{Outcome, Verbosity};
 use crate::explain::{Explanation, Options, Simulation, Verdict, explain, explain_plant};
 use crate::log::{Channel, Log, LogError, Reading, RoleNeed, Roles, Source};
@@ -50,6 +51,9 @@ pub(super) struct Flags {
     /// Which simulated output is which recorded one, when their names differ: SIMULATED=RECORDED, comma-separated
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     map: Vec<String>,
+    /// Inputs of a plant in equations between samples [default: zero]
+    #[arg(long, value_enum)]
+    hold: Option<HoldFlag>,
     /// Leave effects out of the library, comma-separated ids
     #[arg(long, value_name = "IDS", value_delimiter = ',')]
     without: Vec<String>,
@@ -77,6 +81,11 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     if let Some(plant) = flags.simulation.iter().find(|f| is_plant_file(f)) {
         let explanation = of_plant(&flags, plant, say)?;
         return tell(&flags, &explanation, output.as_ref(), report.as_ref(), say);
+    }
+    if flags.hold.is_some() {
+        anyhow::bail!(
+            "--hold belongs to a plant in equations (a .mo text), and the simulation is none"
+        );
     }
     let roles = flags.roles.clone().roles();
     let mut readings: Vec<Reading> = Vec::with_capacity(flags.logs.len());
@@ -123,7 +132,8 @@ fn of_plant(flags: &Flags, plant: &Path, say: Verbosity) -> anyhow::Result<Expla
         RoleNeed::Identify,
         say,
     )?;
-    explain_plant(&at_values, &logs, recordings, loaded.hold)
+    let hold = flags.hold.map_or(loaded.hold, Into::into);
+    explain_plant(&at_values, &logs, recordings, hold)
         .map_err(|e| anyhow::anyhow!("{}: {e}", plant.display()))
 }
 

@@ -15,6 +15,7 @@ use super::explanation::{
     Quantity, Remaining, SignalTraces, Verdict,
 };
 use super::locate::{spectrum, spectrum_picture};
+use super::words::{number, quantity};
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
 use crate::noise::Series;
@@ -554,7 +555,7 @@ impl Answer<'_> {
         let mut lines = Vec::new();
         match verdict {
             Verdict::Consistent => lines.push(
-                "The equations with the values of the text explain the recording; what is left is noise.".to_owned(),
+                "The equations explain the recording with the values of the text; what is left is noise.".to_owned(),
             ),
             Verdict::Parameters => lines.push(
                 "The equations explain the recording with other parameters; nothing is missing in them.".to_owned(),
@@ -570,15 +571,13 @@ impl Answer<'_> {
             let each: Vec<String> = parameters
                 .iter()
                 .map(|p| {
-                    format!(
-                        "{} {:.4} -> {:.4} +- {:.2}{}{}",
-                        p.name,
-                        p.simulation,
-                        p.recording,
-                        p.std.unwrap_or(f64::NAN),
-                        if p.unit.is_empty() { "" } else { " " },
-                        p.unit
-                    )
+                    let recorded = Quantity {
+                        value: p.recording,
+                        std: p.std,
+                        unit: p.unit.clone(),
+                    };
+                    let (name, text) = (&p.name, number(p.simulation));
+                    format!("{name} {text} -> {}", quantity(&recorded))
                 })
                 .collect();
             lines.push(format!(
@@ -587,7 +586,7 @@ impl Answer<'_> {
             ));
         }
         lines.push(format!(
-            "Free run of {output}: {:.1} % with the values of the text, {:.1} % with other parameters{}.",
+            "Free run of {output}: {:.1} % with the values of the text, {:.1} % with estimated parameters and initial states{}.",
             train.simulation.fit_percent,
             train.parameters_only.fit_percent,
             if effects.is_empty() {

@@ -52,6 +52,17 @@ pub fn parse_explanation(name: &str, text: &str) -> Result<Explanation, Document
             advice: "it was written by another version of innovant: update this one, or explain the recording again",
         });
     }
+    if explanation.model.is_none() && explanation.plant.is_none() {
+        let end = text.trim_end();
+        return Err(advised(DocumentError::Broken {
+            name: name.to_owned(),
+            line: end.lines().count().max(1),
+            column: end.lines().last().map_or(0, |l| l.chars().count()),
+            key: String::new(),
+            message: "there is no key `model`".to_owned(),
+            advice: "",
+        }));
+    }
     explanation
         .model
         .as_ref()
