@@ -156,6 +156,7 @@ fn other_parameters_are_no_missing_physics() {
 fn what_is_not_available_with_plants_is_said() {
     let folder = Folder::new();
     folder.text("cart.mo", CART);
+    folder.text("other.mo", CART);
     record(&folder, "log.csv", 1.0, |_, _, _| 0.0, 5);
     let arguments = [
         "explain",
@@ -168,7 +169,7 @@ fn what_is_not_available_with_plants_is_said() {
     let said = folder.run(&arguments).error();
     assert!(said.contains("--without"), "{said}");
     let said = folder
-        .run(&["explain", "log.csv", "--simulation", "cart.mo", "cart.mo"])
+        .run(&["explain", "log.csv", "--simulation", "cart.mo", "other.mo"])
         .error();
     assert!(said.contains("one plant"), "{said}");
 }

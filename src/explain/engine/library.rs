@@ -79,6 +79,14 @@ pub(crate) struct Term {
     pub symbol: &'static str,
 }
 
+impl Term {
+    /// Whether it is known by a name of its own wherever it is found.
+    pub fn has_a_name(&self) -> bool {
+        matches!(self.port, Port::Input | Port::Sensor)
+            || matches!(self.id, "radiation" | "natural_convection" | "load_step")
+    }
+}
+
 const fn shape(symbol: &'static str, starts: Starts, positive: bool) -> Shape {
     Shape {
         symbol,

@@ -64,11 +64,10 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
             "temperature_dependent_resistance"
         }
         (Port::Parameter, "parameter_curve" | "parameter_square") => match what {
-            Kind::Temperature => "temperature_dependent_resistance",
+            Kind::Temperature if unit_of_place == "Ohm" => "temperature_dependent_resistance",
             Kind::Position => "position_dependent_gain",
             _ => "law",
         },
-        (Port::Parameter, _) => "parameter_change",
         (Port::Equation, "signed_square") if what == Kind::Velocity => "quadratic_drag",
         (Port::Equation, "cube") => match what {
             Kind::Velocity => "cubic_drag",

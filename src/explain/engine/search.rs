@@ -16,6 +16,8 @@ const GLANCED: usize = 24;
 /// ... of them at most so many of one kind and at one place.
 const OF_A_KIND: usize = 3;
 const AT_A_PLACE: usize = 8;
+/// The best lead of each term is fitted too where its statistic is at least this part of the best.
+const IMITATED: f64 = 0.3;
 const GLANCE: Effort = Effort {
     iterations: 8,
     settled: 0.3,
@@ -98,6 +100,13 @@ fn promising(screen: &Screen) -> Vec<Lead> {
             break;
         }
     }
+    // What has a name of its own is not crowded out by curves that imitate it.
+    let strong = screen.leads.first().map_or(0.0, |l| IMITATED * l.statistic);
+    for lead in screen.leads.iter().filter(|l| l.statistic > strong) {
+        if !kept.iter().any(|l| l.term == lead.term) {
+            kept.push(lead.clone());
+        }
+    }
     kept
 }
 
@@ -147,8 +156,19 @@ fn step(
     glanced.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut chosen: Vec<(Lead, usize, Candidate, Fit)> = Vec::new();
     for which in 0..tried.len() {
-        let best = glanced.iter().filter(|g| g.2 == which).take(FITTED);
-        chosen.extend(best.map(|g| (g.1.clone(), g.2, g.3.clone(), g.4.clone())));
+        let list: Vec<_> = glanced.iter().filter(|g| g.2 == which).collect();
+        let most = list.first().map_or(0.0, |g| g.0);
+        let close = |g: &&_| {
+            let (gain, lead, ..): &(f64, Lead, usize, Candidate, Fit) = g;
+            *gain > (1.0 - TIE.1) * most && lead.term.has_a_name()
+        };
+        let best = list.iter().take(FITTED);
+        let others = list.iter().skip(FITTED).copied().filter(close);
+        chosen.extend(
+            best.copied()
+                .chain(others)
+                .map(|g| (g.1.clone(), g.2, g.3.clone(), g.4.clone())),
+        );
     }
     let mut fitted: Vec<Fitted> = chosen
         .into_par_iter()
