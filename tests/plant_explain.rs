@@ -152,6 +152,22 @@ fn other_parameters_are_no_missing_physics() {
     }
 }
 
+/// The text falls over in free run; the recording was made with another spring, which holds it.
+#[test]
+fn a_text_that_cannot_be_simulated_is_not_given_a_fit() {
+    let folder = Folder::new();
+    let falls = CART.replace("min=30, max=50) = 40", "min=-30, max=50) = -20");
+    folder.text("cart.mo", &falls);
+    record(&folder, "log.csv", 1.0, |_, _, _| 0.0, 5);
+    let said = explained(&folder, "log.csv");
+    let fit = said["fit"]["train"]["simulation"]["fit_percent"]
+        .as_f64()
+        .unwrap();
+    assert!(fit.abs() < 1e-6, "{fit}");
+    let summary = said["summary"].to_string();
+    assert!(summary.contains("cannot be simulated"), "{summary}");
+}
+
 #[test]
 fn what_is_not_available_with_plants_is_said() {
     let folder = Folder::new();

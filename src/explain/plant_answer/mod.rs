@@ -1,18 +1,15 @@
 //! The answer where the simulation is a plant in equations.
 
-use std::collections::BTreeMap;
+mod effects;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::answer::extremes;
-use super::engine::edit::{Place, user_of};
 use super::engine::library::Port;
-use super::engine::names::named;
-use super::engine::search::{Fitted, Found, NEEDED, search};
+use super::engine::search::{Fitted, Found, search};
 use super::explanation::{
-    Alternative, AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Evidence,
-    Explanation, FitFigure, FitSteps, FitTable, Law, Location, NoiseFound, ParameterChange,
-    Quantity, Remaining, SignalTraces, Verdict,
+    AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
+    FitTable, Location, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
 };
 use super::locate::{spectrum, spectrum_picture};
 use super::words::{number, quantity};
@@ -31,8 +28,6 @@ const DIFFERENT: f64 = 3.3;
 const CHANCE: f64 = 1e-9;
 /// Points of a picture.
 const TRACE_POINTS: usize = 1500;
-/// Points of a law.
-const LAW_POINTS: usize = 41;
 
 /// Says what a plant in equations leaves out of recordings.
 ///
@@ -80,6 +75,13 @@ struct Answer<'a> {
     hold: Hold,
     found: &'a Found,
     channels: Vec<Channel>,
+}
+
+/// The mean of the values that are there, at every sample.
+fn level(recorded: &[f64]) -> Vec<f64> {
+    let known = recorded.iter().filter(|y| y.is_finite());
+    let (sum, count) = known.fold((0.0, 0), |(sum, count), y| (sum + y, count + 1));
+    vec![sum / f64::from(count.max(1)); recorded.len()]
 }
 
 fn figure(recorded: &[f64], simulated: &[f64]) -> FitFigure {
@@ -157,13 +159,11 @@ impl Answer<'_> {
             .iter()
             .flat_map(|r| r.outputs.clone())
             .collect();
-        let missing = || {
-            recorded
-                .iter()
-                .map(|y| vec![f64::NAN; y.len()])
-                .collect::<Series>()
-        };
-        let given = self.given().unwrap_or_else(missing);
+        // What cannot be simulated follows the recording no better than its mean.
+        let missing = || recorded.iter().map(|y| level(y)).collect::<Series>();
+        let simulated = self.given();
+        let runs = simulated.is_some();
+        let given = simulated.unwrap_or_else(missing);
         let only = self
             .base
             .free_run(&self.found.baseline)
@@ -179,7 +179,7 @@ impl Answer<'_> {
                 simulation: figure(&y, &column(&given)),
                 parameters_only: figure(&y, &column(&only)),
                 augmented: figure(&y, &column(&with)),
-                noise_floor: figure(&y, &column(&with)),
+                noise_floor: self.noise_floor(o, p_value, &y, &column(&with)),
                 improvement_95: None,
             }
         };
@@ -196,7 +196,13 @@ impl Answer<'_> {
         let train = steps(shows);
         let removed = 1.0
             - (train.augmented.rmse / train.parameters_only.rmse.max(f64::MIN_POSITIVE)).powi(2);
-        let summary = self.summary(verdict, &effects, &parameters, &outputs[shows], &train);
+        let mut summary = self.summary(verdict, &effects, &parameters, &outputs[shows], &train);
+        if !runs {
+            summary.push(
+                "The equations cannot be simulated over the recording with the values of the text; the mean of the recording stands for them."
+                    .to_owned(),
+            );
+        }
         Explanation {
             format: EXPLANATION_FORMAT.to_owned(),
             verdict,
@@ -265,6 +271,26 @@ impl Answer<'_> {
         }
     }
 
+    /// What is left, where that is noise; else only its unforeseeable part.
+    fn noise_floor(
+        &self,
+        output: usize,
+        p_value: f64,
+        recorded: &[f64],
+        simulated: &[f64],
+    ) -> FitFigure {
+        let whole = figure(recorded, simulated);
+        if p_value >= CHANCE {
+            return whole;
+        }
+        let rmse = self.found.fit.noise.scale[output].min(whole.rmse);
+        let spread = figure(recorded, &level(recorded)).rmse;
+        FitFigure {
+            rmse,
+            fit_percent: 100.0 * (1.0 - rmse / spread.max(f64::MIN_POSITIVE)),
+        }
+    }
+
     fn outputs(&self) -> Vec<(String, String)> {
         let spec = &self.plant.spec;
         let of = |v| {
@@ -319,166 +345,6 @@ impl Answer<'_> {
             })
         })
         .collect()
-    }
-
-    fn effect(&self, step: usize, fitted: &Fitted) -> Option<EffectFound> {
-        let before = self.spec_before(step);
-        let id = named(before, fitted);
-        let at = fitted.lead.place.variable(before);
-        // A parameter acts through the equation that uses it.
-        let entered = match fitted.lead.place {
-            Place::Parameter(p) => user_of(before, p),
-            _ => at,
-        };
-        let name = |v| before.variable(v).column().to_owned();
-        let (at, enters) = (name(at), name(entered));
-        let covariance = self.whole.covariance(&self.found.fit);
-        let spec = &self.found.plant.spec;
-        let names: Vec<&str> = spec
-            .parameters()
-            .iter()
-            .map(|&v| spec.variable(v).name.as_str())
-            .collect();
-        let mut parameters = BTreeMap::new();
-        for name in &fitted.candidate.names {
-            let at = names.iter().position(|n| n == name)?;
-            let std = covariance[(at, at)].max(0.0).sqrt();
-            parameters.insert(
-                name.clone(),
-                Quantity {
-                    value: self.found.fit.point[at],
-                    std: std.is_finite().then_some(std),
-                    unit: String::new(),
-                },
-            );
-        }
-        let depends = match fitted.lead.term.port {
-            Port::Sensor if !fitted.depends.is_empty() => vec![enters.clone()],
-            _ if fitted.depends.is_empty() && fitted.lead.term.form.contains("time") => {
-                vec!["time".to_owned()]
-            }
-            _ => fitted.depends.clone(),
-        };
-        let depends = match fitted.lead.place {
-            Place::Parameter(_) => depends.into_iter().chain([at.clone()]).collect(),
-            _ => depends,
-        };
-        let place = match fitted.lead.place {
-            Place::Equation(_) if fitted.lead.sensor => format!("the sensor {enters}"),
-            Place::Equation(_) => format!("the equation of {enters}"),
-            Place::Input(_) => format!("the input {enters}"),
-            Place::Parameter(_) => format!("the parameter {at}"),
-        };
-        let of = match fitted.depends.as_slice() {
-            [] if depends.iter().any(|d| d == "time") => " as a function of time".to_owned(),
-            [] => String::new(),
-            names => format!(" as a function of {}", names.join(" and ")),
-        };
-        Some(EffectFound {
-            effect: id.to_owned(),
-            variant: fitted.lead.term.id.to_owned(),
-            signal: enters.clone(),
-            port: match fitted.lead.term.port {
-                Port::Input => "input",
-                Port::Sensor => "sensor",
-                Port::Equation | Port::Parameter => "process",
-            }
-            .to_owned(),
-            equation: fitted.candidate.equation.clone(),
-            law: self.law(fitted),
-            enters: Some(enters),
-            depends,
-            parameters,
-            evidence: Evidence {
-                criterion_gain: fitted.gain,
-                criterion_needed: NEEDED,
-                heldout_gain: None,
-                halves_disagree: None,
-            },
-            sentence: format!(
-                "{} enters {place}{of}: {}",
-                spoken(id),
-                fitted.candidate.equation
-            ),
-        })
-    }
-
-    /// What is added to an equation, as a curve of its one argument.
-    fn law(&self, fitted: &Fitted) -> Option<Law> {
-        let term = fitted.lead.term;
-        if term.port != Port::Equation || term.memory.is_some() || fitted.depends.len() != 1 {
-            return None;
-        }
-        let spec = &self.found.plant.spec;
-        let names: Vec<&str> = spec
-            .parameters()
-            .iter()
-            .map(|&v| spec.variable(v).name.as_str())
-            .collect();
-        let shapes: Vec<String> = fitted
-            .candidate
-            .names
-            .iter()
-            .filter_map(|n| names.iter().position(|m| m == n))
-            .map(|at| format!("({:e})", self.found.fit.point[at]))
-            .collect();
-        let strength = shapes.last()?;
-        let text = super::engine::screen::filled(term.form, term, "z", "", &shapes, 1.0);
-        let curve = crate::physics::parse(&format!(
-            "model Law input Real z; output Real y; equation y = {strength}*({text}); end Law;"
-        ))
-        .ok()?;
-        let (low, high) = fitted.range;
-        let at: Vec<f64> = (0..LAW_POINTS)
-            .map(|i| low + (high - low) * i as f64 / (LAW_POINTS - 1) as f64)
-            .collect();
-        let inputs = [at.as_slice()];
-        let excitation = Excitation {
-            inputs: &inputs,
-            length: LAW_POINTS,
-            sample_time: 1.0,
-            start_time: 0.0,
-            hold: Hold::Zero,
-        };
-        let plant = Plant::new(curve);
-        let run = plant.simulate(&plant.nominal(), &excitation, None).ok()?;
-        Some(Law {
-            variable: fitted.depends[0].clone(),
-            std: vec![0.0; LAW_POINTS],
-            value: run.outputs.into_iter().next()?,
-            at,
-        })
-    }
-
-    fn alternatives(&self, verdict: Verdict) -> Vec<Alternative> {
-        let Some(first) = self.found.steps.first() else {
-            return vec![];
-        };
-        let best = first.first().map_or(1.0, |f| f.gain).max(1e-9);
-        let skip = usize::from(verdict == Verdict::Named);
-        let mut seen: Vec<&str> = first
-            .iter()
-            .take(skip)
-            .map(|f| named(&self.plant.spec, f))
-            .collect();
-        let mut all = Vec::new();
-        for fitted in first.iter().skip(skip) {
-            let id = named(&self.plant.spec, fitted);
-            if seen.contains(&id) || fitted.gain <= 0.0 {
-                continue;
-            }
-            seen.push(id);
-            all.push(Alternative {
-                effect: id.to_owned(),
-                support: (fitted.gain / best).clamp(0.0, 1.0),
-                criterion_gain: fitted.gain,
-                why_not: format!(
-                    "{}: its criterion gains {:.1}, that of the best {:.1}",
-                    fitted.candidate.equation, fitted.gain, best
-                ),
-            });
-        }
-        all
     }
 
     fn noise(&self) -> Vec<NoiseFound> {
@@ -602,15 +468,6 @@ impl Answer<'_> {
 /// Probability of a chi-square with one degree of freedom beyond `statistic`.
 fn chance(statistic: f64) -> f64 {
     ChiSquared::new(1.0).map_or(1.0, |law| law.sf(statistic))
-}
-
-/// The id in words, as a sentence begins with it.
-fn spoken(id: &str) -> String {
-    let words = id.replace('_', " ");
-    let mut letters = words.chars();
-    letters.next().map_or(String::new(), |first| {
-        first.to_uppercase().collect::<String>() + letters.as_str()
-    })
 }
 
 /// Share of such answers that were right on the first 37 plants of the physical cases that the engine was developed on; not
