@@ -14,6 +14,8 @@ pub(crate) struct Argument {
     pub temperature: bool,
     pub difference: bool,
     pub product: bool,
+    /// A temperature in kelvins of a plant that has it in degrees.
+    pub absolute: bool,
     pub angle: bool,
     /// Changes at samples only: it is made of inputs.
     pub held: bool,
@@ -41,10 +43,11 @@ impl Argument {
             .iter()
             .all(|&v| spec.variable(v).kind == VariableKind::Input);
         Self {
-            temperature: variables.len() == 1 && matches!(unit(variables[0]), "K" | "degC"),
+            temperature: variables.len() == 1 && unit(variables[0]) == "K",
             angle: variables.len() == 1 && unit(variables[0]) == "rad",
             difference: false,
             product: false,
+            absolute: false,
             held,
             expression,
             variables,
@@ -89,9 +92,22 @@ impl Argument {
         (self.sorted.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
     }
 
+    /// Range of its integral, the largest of all recordings.
+    pub fn travel(&self, sample_time: f64) -> f64 {
+        let of = |values: &Vec<f64>| {
+            let (mut sum, mut low, mut high) = (0.0f64, 0.0f64, 0.0f64);
+            for v in values.iter().filter(|v| v.is_finite()) {
+                sum += v * sample_time;
+                (low, high) = (low.min(sum), high.max(sum));
+            }
+            high - low
+        };
+        self.values.iter().map(of).fold(0.0, f64::max)
+    }
+
     /// Whether a term can be a function of it.
     pub fn serves(&self, needs: Needs) -> bool {
-        if self.product {
+        if self.product || self.absolute && needs != Needs::Temperature {
             return false;
         }
         let both = self.quantile(0.05) < 0.0 && self.quantile(0.95) > 0.0;
@@ -135,6 +151,13 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
         .iter()
         .map(|&v| Argument::new(spec, name(v), vec![v]))
         .collect();
+    for &v in &simple {
+        if spec.variable(v).unit_text.as_deref() == Some("degC") {
+            let mut kelvins = Argument::new(spec, format!("({} + 273.15)", name(v)), vec![v]);
+            (kelvins.temperature, kelvins.absolute) = (true, true);
+            found.push(kelvins);
+        }
+    }
     let source = |v: VariableId| spec.variable(v).kind != VariableKind::Algebraic;
     for (i, &a) in simple.iter().enumerate() {
         for &b in &simple[i + 1..] {

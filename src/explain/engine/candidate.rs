@@ -3,9 +3,18 @@
 use super::argument::Argument;
 use super::edit::{Edit, NewParameter, Place, literal};
 use super::library::{Port, Starts};
-use super::screen::{Lead, filled, memory_start};
+use super::screen::Lead;
+use super::values::filled;
 use crate::physics::estimate::{Fit, Form, PlantRecording};
 use crate::physics::{ModelSpec, Plant};
+
+/// Shortest time constant, in samples.
+const LEAST_SAMPLES: f64 = 0.1;
+/// Narrowest width, as a part of the argument's standard deviation.
+const LEAST_SPREAD: f64 = 1e-3;
+
+/// Least yield of bristles, as a part of the value that is started from.
+const LEAST_YIELD: f64 = 0.05;
 
 /// A plant with a term more.
 #[derive(Debug, Clone)]
@@ -53,6 +62,13 @@ pub(crate) fn candidate(
                 (begin, begin + length)
             }
             Starts::Samples(_) if term.form.contains("delay") => (0.0, 100.0 * value + h),
+            // Shorter times and narrower shapes are not told from none, and cost steps.
+            Starts::Samples(_) if term.form.contains("{m}") => (LEAST_SAMPLES * h, f64::INFINITY),
+            Starts::Spread(_) => (
+                LEAST_SPREAD * argument.map_or(0.0, Argument::spread),
+                f64::INFINITY,
+            ),
+            Starts::Travel(_) => (LEAST_YIELD * value, f64::INFINITY),
             _ if shape.positive => (1e-3 * value, f64::INFINITY),
             _ => (f64::NEG_INFINITY, f64::INFINITY),
         };
@@ -72,12 +88,15 @@ pub(crate) fn candidate(
         (Some(_), Place::Equation(_)) if lead.sensor => "{v}".to_owned(),
         (Some(a), _) => a.expression.clone(),
     };
-    let memory = free_name(spec, &format!("{}_state", term.id));
-    let body = filled(term.form, term, &text, &memory, &shapes, h);
-    let mut new_states = 0;
-    if let Some(rate) = term.memory {
-        let first = argument.map_or(0.0, |a| a.values[0][0]);
-        let first = memory_start(term, first);
+    let memories: Vec<String> = (0..term.memories.len())
+        .map(|i| match i {
+            0 => free_name(spec, &format!("{}_state", term.id)),
+            _ => free_name(spec, &format!("{}_state_{i}", term.id)),
+        })
+        .collect();
+    let body = filled(term.form, term, &text, &memories, &shapes, h);
+    for (memory, name) in term.memories.iter().zip(&memories) {
+        let first = memory.start.at(argument.map_or(0.0, |a| a.values[0][0]));
         let source = if lead.sensor {
             let Place::Equation(at) = lead.place else {
                 return None;
@@ -88,16 +107,31 @@ pub(crate) fn candidate(
             text.clone()
         };
         edit.declarations.push(format!(
-            "Real {memory}(start={}, fixed=true);",
+            "Real {name}(start={}, fixed=true);",
             literal(first)
         ));
         edit.equations.push(format!(
-            "der({memory}) = {};",
-            filled(rate, term, &source, &memory, &shapes, h)
+            "der({name}) = {};",
+            filled(memory.rate, term, &source, &memories, &shapes, h)
         ));
-        new_states = 1;
     }
-    let added = if term.free_strength {
+    let new_states = memories.len();
+    let added = if let Some(curve) = &lead.curve {
+        let names: Vec<String> = (1..=curve.values.len())
+            .map(|i| free_name(spec, &format!("{}_{i}", term.id)))
+            .collect();
+        for (name, &value) in names.iter().zip(&curve.values) {
+            edit.parameters.push(NewParameter {
+                name: name.clone(),
+                value,
+                min: f64::NEG_INFINITY,
+                max: f64::INFINITY,
+                description: String::new(),
+            });
+            values.push(value);
+        }
+        format!("({})", curve.text(&text, &names))
+    } else if term.free_strength {
         let name = free_name(spec, &format!("{}_{}", term.id, term.symbol));
         edit.parameters.push(NewParameter {
             name: name.clone(),

@@ -21,6 +21,20 @@ impl Place {
             Self::Input(v) | Self::Parameter(v) => v,
         }
     }
+
+    /// Whether the equation here uses a variable.
+    pub fn uses(self, spec: &ModelSpec, variable: VariableId) -> bool {
+        match self {
+            Self::Equation(at) => {
+                let (left, right) = (spec.equations[at].left, spec.equations[at].right);
+                let (left, right) = (spec.expressions.span(left), spec.expressions.span(right));
+                uses(spec, variable)
+                    .iter()
+                    .any(|u| left.start <= u.start && u.end <= right.end)
+            }
+            Self::Input(v) | Self::Parameter(v) => v == variable,
+        }
+    }
 }
 
 /// A parameter that a change brings along.

@@ -22,7 +22,7 @@ pub(crate) enum Needs {
     BothSigns,
     /// Never below zero.
     Positive,
-    /// A temperature.
+    /// An absolute temperature.
     Temperature,
     /// A difference of two variables of one unit.
     Difference,
@@ -45,11 +45,37 @@ pub(crate) enum Starts {
     Waves(&'static [f64]),
     /// Parts of the recording's length.
     Length(&'static [f64]),
+    /// Parts of the range of the argument's integral.
+    Travel(&'static [f64]),
+    /// Parts of the argument's range in a sample.
+    Rate(&'static [f64]),
     /// Numbers of samples.
     Samples(&'static [f64]),
     /// As they stand.
     Values(&'static [f64]),
 }
+
+/// Where a memory starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum MemoryStart {
+    /// At the first value of the argument.
+    Argument,
+    /// At its square.
+    Square,
+    /// At zero.
+    Zero,
+}
+
+/// A state of a term's own: `{m}`, and `{p}` for a second one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Memory {
+    /// Its derivative.
+    pub rate: &'static str,
+    pub start: MemoryStart,
+}
+
+/// What stands for the memories in a form.
+pub(crate) const MEMORIES: [&str; 2] = ["{m}", "{p}"];
 
 /// A number that shapes a term.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,23 +94,16 @@ pub(crate) struct Term {
     pub id: &'static str,
     pub port: Port,
     pub needs: Needs,
-    /// Function of `{z}`, of the shapes, and of the memory `{m}`; the strength is its factor.
+    /// Function of `{z}`, of the shapes, and of the memories; the strength is its factor.
     pub form: &'static str,
-    /// `d{m}/dt`, where the term has a memory; it starts at `{z}`'s first value times this.
-    pub memory: Option<&'static str>,
+    pub memories: &'static [Memory],
     pub shapes: &'static [Shape],
     /// False when the size of the term is fixed by its shapes: `{v}` becomes the form itself.
     pub free_strength: bool,
     /// Symbol of its strength.
     pub symbol: &'static str,
-}
-
-impl Term {
-    /// Whether it is known by a name of its own wherever it is found.
-    pub fn has_a_name(&self) -> bool {
-        matches!(self.port, Port::Input | Port::Sensor)
-            || matches!(self.id, "radiation" | "natural_convection" | "load_step")
-    }
+    /// Units of the parameters that it may enter; none: all.
+    pub units: &'static [&'static str],
 }
 
 const fn shape(symbol: &'static str, starts: Starts, positive: bool) -> Shape {
@@ -107,10 +126,11 @@ const fn curve(
         port,
         needs,
         form,
-        memory: None,
+        memories: &[],
         shapes,
         free_strength: true,
         symbol: "c",
+        units: &[],
     }
 }
 
@@ -123,6 +143,9 @@ const TIMES: &[f64] = &[
 
 use Needs::{Angle, Anything, BothSigns, Difference, Positive, Temperature, Time};
 use Port::{Equation, Input, Parameter, Sensor};
+
+/// A function that nobody listed: its text is that of its pieces.
+pub(crate) const CURVE: Term = curve("curve", Equation, Anything, "", &[]);
 
 /// The library.
 pub(crate) const TERMS: &[Term] = &[
@@ -148,6 +171,21 @@ pub(crate) const TERMS: &[Term] = &[
             shape("vs", Starts::Spread(&[0.1, 0.3, 0.8]), true),
         ],
     ),
+    // Bristles that yield: P. R. Dahl, A Solid Friction Model, Aerospace Corporation TOR-158, 1968.
+    Term {
+        id: "bristles",
+        port: Equation,
+        needs: BothSigns,
+        form: "{m}",
+        memories: &[Memory {
+            rate: "({z} - abs({z})*{m})/{s}",
+            start: MemoryStart::Zero,
+        }],
+        shapes: &[shape("s", Starts::Travel(&[0.003, 0.02, 0.1, 0.4]), true)],
+        free_strength: true,
+        symbol: "c",
+        units: &[],
+    },
     curve("one_sided", Equation, BothSigns, "max({z}, 0)", &[]),
     curve(
         "above",
@@ -237,17 +275,21 @@ pub(crate) const TERMS: &[Term] = &[
         port: Parameter,
         needs: Anything,
         form: "{m}",
-        memory: Some("({z}^2 - {m})/{T}"),
+        memories: &[Memory {
+            rate: "({z}^2 - {m})/{T}",
+            start: MemoryStart::Square,
+        }],
         shapes: &[shape("T", Starts::Length(&[0.02, 0.1, 0.4]), true)],
         free_strength: true,
         symbol: "c",
+        units: &["Ohm"],
     },
     Term {
         id: "input_saturation",
         port: Input,
         needs: BothSigns,
         form: "min(max({z}, -{L}), {L}) - {z}",
-        memory: None,
+        memories: &[],
         shapes: &[shape(
             "L",
             Starts::SizeQuantiles(&[0.6, 0.8, 0.9, 0.97]),
@@ -255,36 +297,40 @@ pub(crate) const TERMS: &[Term] = &[
         )],
         free_strength: false,
         symbol: "",
+        units: &[],
     },
     Term {
         id: "input_saturation",
         port: Input,
         needs: Anything,
         form: "min({z}, {L}) - {z}",
-        memory: None,
+        memories: &[],
         shapes: &[shape("L", Starts::Quantiles(&[0.6, 0.8, 0.9, 0.97]), false)],
         free_strength: false,
         symbol: "",
+        units: &[],
     },
     Term {
         id: "input_saturation",
         port: Input,
         needs: Anything,
         form: "max({z}, {L}) - {z}",
-        memory: None,
+        memories: &[],
         shapes: &[shape("L", Starts::Quantiles(&[0.4, 0.2, 0.1, 0.03]), false)],
         free_strength: false,
         symbol: "",
+        units: &[],
     },
     Term {
         id: "input_dead_zone",
         port: Input,
         needs: BothSigns,
         form: "-min(max({z}, -{d}), {d})",
-        memory: None,
+        memories: &[],
         shapes: &[shape("d", Starts::SizeQuantiles(&[0.1, 0.3, 0.5]), true)],
         free_strength: false,
         symbol: "",
+        units: &[],
     },
     curve("input_asymmetry", Input, BothSigns, "max({z}, 0)", &[]),
     curve("input_square", Input, Anything, "{z}^2", &[]),
@@ -294,7 +340,7 @@ pub(crate) const TERMS: &[Term] = &[
         port: Input,
         needs: Anything,
         form: "delay({z}, {T}) - {z}",
-        memory: None,
+        memories: &[],
         shapes: &[shape(
             "T",
             Starts::Samples(&[0.5, 1.0, 2.0, 4.0, 8.0]),
@@ -302,36 +348,74 @@ pub(crate) const TERMS: &[Term] = &[
         )],
         free_strength: false,
         symbol: "",
+        units: &[],
     },
     Term {
         id: "actuator_lag",
         port: Input,
         needs: Anything,
         form: "{m} - {z}",
-        memory: Some("({z} - {m})/{T}"),
+        memories: &[Memory {
+            rate: "({z} - {m})/{T}",
+            start: MemoryStart::Argument,
+        }],
         shapes: &[shape("T", Starts::Samples(&[0.5, 2.0, 6.0, 20.0]), true)],
         free_strength: false,
         symbol: "",
+        units: &[],
     },
     Term {
         id: "input_backlash",
         port: Input,
         needs: Anything,
         form: "{m} - {z}",
-        memory: Some("(max({z} - {g} - {m}, 0) + min({z} + {g} - {m}, 0))*{fast}"),
+        memories: &[Memory {
+            rate: "(max({z} - {g} - {m}, 0) + min({z} + {g} - {m}, 0))*{fast}",
+            start: MemoryStart::Argument,
+        }],
         shapes: &[shape("g", Starts::Spread(&[0.02, 0.1, 0.3]), true)],
         free_strength: false,
         symbol: "",
+        units: &[],
+    },
+    // A valve that sticks until its signal is `S` away, and then slips to it: {p} is 1 while it moves.
+    Term {
+        id: "valve_stiction",
+        port: Input,
+        needs: Anything,
+        form: "{m} - {z}",
+        memories: &[
+            Memory {
+                rate: "{fast}*{p}*({z} - {m})",
+                start: MemoryStart::Argument,
+            },
+            Memory {
+                rate: "{fast}*(0.5 + 0.5*tanh(20*(abs({z} - {m})/{S} - 1 + 0.9*{p})) - {p})",
+                start: MemoryStart::Zero,
+            },
+        ],
+        shapes: &[shape("S", Starts::Spread(&[0.1, 0.3, 0.6]), true)],
+        free_strength: false,
+        symbol: "",
+        units: &[],
     },
     Term {
         id: "input_rate_limit",
         port: Input,
         needs: Anything,
         form: "{m} - {z}",
-        memory: Some("min(max(({z} - {m})*{fast}, -{R}), {R})"),
-        shapes: &[shape("R", Starts::Samples(&[0.02, 0.1, 0.3]), true)],
+        memories: &[Memory {
+            rate: "min(max(({z} - {m})*{fast}, -{R}), {R})",
+            start: MemoryStart::Argument,
+        }],
+        shapes: &[shape(
+            "R",
+            Starts::Rate(&[0.001, 0.003, 0.01, 0.03, 0.1, 0.3]),
+            true,
+        )],
         free_strength: false,
         symbol: "",
+        units: &[],
     },
     curve("sensor_offset", Sensor, Time, "1.0", &[]),
     curve("sensor_drift", Sensor, Time, "time", &[]),
@@ -341,22 +425,27 @@ pub(crate) const TERMS: &[Term] = &[
         port: Sensor,
         needs: Anything,
         form: "{m} - {z}",
-        memory: Some("({z} - {m})/{T}"),
+        memories: &[Memory {
+            rate: "({z} - {m})/{T}",
+            start: MemoryStart::Argument,
+        }],
         shapes: &[shape("T", Starts::Samples(&[0.5, 2.0, 6.0, 20.0]), true)],
         free_strength: false,
         symbol: "",
+        units: &[],
     },
     Term {
         id: "sensor_saturation",
         port: Sensor,
         needs: Anything,
         form: "min(max({z}, {lower}), {upper}) - {z}",
-        memory: None,
+        memories: &[],
         shapes: &[
             shape("lower", Starts::Quantiles(&[0.03, 0.1, 0.0]), false),
             shape("upper", Starts::Quantiles(&[0.97, 0.9, 1.0]), false),
         ],
         free_strength: false,
         symbol: "",
+        units: &[],
     },
 ];

@@ -2,8 +2,12 @@
 
 pub(crate) mod argument;
 pub(crate) mod candidate;
+pub(crate) mod curve;
 pub(crate) mod edit;
 pub(crate) mod library;
 pub(crate) mod names;
+mod path;
+mod projection;
 pub(crate) mod screen;
 pub(crate) mod search;
+pub(crate) mod values;

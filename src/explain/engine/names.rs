@@ -3,7 +3,7 @@
 use crate::physics::{ModelSpec, Node, Unknown, VariableId, VariableKind};
 
 use super::edit::Place;
-use super::library::Port;
+use super::library::{Port, Term};
 use super::search::Fitted;
 
 /// What kind of quantity an argument is.
@@ -43,6 +43,14 @@ fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
     }
 }
 
+/// Whether a state with this unit is what a store holds: a level, a charge, a share of it.
+fn flows(unit: &str) -> bool {
+    matches!(
+        unit,
+        "m" | "m3" | "kg" | "1" | "%" | "A.h" | "C" | "l" | "L" | "Pa" | "bar"
+    )
+}
+
 /// Whether a variable is in no equation of the plant.
 fn unused(spec: &ModelSpec, v: VariableId) -> bool {
     !spec.expressions.any(|n| *n == Node::Variable(v))
@@ -50,11 +58,35 @@ fn unused(spec: &ModelSpec, v: VariableId) -> bool {
 
 /// The id of what was found in a plant; `law` for a function that has no name there.
 pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
-    let term = found.lead.term;
     let variables: Vec<VariableId> = found.depends.iter().filter_map(|n| spec.find(n)).collect();
-    let what = kind(spec, &variables);
-    let own = found.lead.place.variable(spec);
-    let unit_of_place = spec.variable(own).unit_text.as_deref().unwrap_or("");
+    let id = name_of(spec, found.lead.term, found.lead.place, &variables);
+    // Values of the fit decide between names of one term.
+    let low = |shape: f64| shape < 0.5 * (found.range.0 + found.range.1);
+    match (id, found.shapes.first()) {
+        ("hysteresis", Some(&slip))
+            if kind(spec, &variables) == Kind::Velocity && slip < YIELDS * found.travel =>
+        {
+            "coulomb_friction"
+        }
+        ("overflow", Some(&edge)) if found.lead.term.id == "root_above" && low(edge) => "leak",
+        _ => id,
+    }
+}
+
+/// Bristles that yield within this part of the travel are dry friction.
+const YIELDS: f64 = 0.12;
+
+/// The id of a term at a place, as a function of variables.
+pub(super) fn name_of(
+    spec: &ModelSpec,
+    term: &Term,
+    place: Place,
+    variables: &[VariableId],
+) -> &'static str {
+    let what = kind(spec, variables);
+    let own = place.variable(spec);
+    let unit = |v: VariableId| spec.variable(v).unit_text.as_deref().unwrap_or("");
+    let unit_of_place = unit(own);
     match (term.port, term.id) {
         (Port::Sensor, id) => id,
         (Port::Input, "input_square" | "input_cube") => "input_curve",
@@ -79,14 +111,15 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
         }
         (Port::Equation, "friction") if what == Kind::Velocity => "coulomb_friction",
         (Port::Equation, "stribeck") if what == Kind::Velocity => "stribeck_friction",
+        (Port::Equation, "bristles") => "hysteresis",
         (Port::Equation, "one_sided") if what == Kind::Velocity => "asymmetric_damping",
         (Port::Equation, "above" | "below" | "both_sides") => match what {
             Kind::Position => "end_stop",
-            Kind::Other if variables == [own] => "overflow",
+            Kind::Other if *variables == [own] => "overflow",
             _ => "law",
         },
-        (Port::Equation, "root_above") if variables == [own] => "overflow",
-        (Port::Equation, "root") if variables == [own] => "leak",
+        (Port::Equation, "root_above") if *variables == [own] => "overflow",
+        (Port::Equation, "root") if *variables == [own] => "leak",
         (Port::Equation, "sine") => "cogging",
         (Port::Equation, "radiation") => "radiation",
         (Port::Equation, "natural_convection") if what == Kind::Temperature => "natural_convection",
@@ -96,6 +129,8 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
             match (output, term.id) {
                 (true, "load_ramp") => "sensor_drift",
                 (true, _) => "sensor_offset",
+                // A constant outflow of a store, where it is no force.
+                (false, "load_constant") if flows(unit_of_place) => "leak",
                 (false, _) => "load_step",
             }
         }
@@ -103,10 +138,12 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
             if variables.iter().any(|&v| unused(spec, v)) {
                 "missing_input"
             } else if variables.len() > 1 {
-                let heated = variables
+                // What a temperature does to something that enters the same equation.
+                let (heated, others): (Vec<VariableId>, Vec<_>) = variables
                     .iter()
-                    .any(|&v| kind(spec, &[v]) == Kind::Temperature);
-                if heated {
+                    .partition(|&&v| kind(spec, &[v]) == Kind::Temperature);
+                let inside = |v: &VariableId| place.uses(spec, *v);
+                if !heated.is_empty() && !others.is_empty() && others.iter().all(inside) {
                     "temperature_dependent_resistance"
                 } else {
                     "law"
@@ -119,16 +156,31 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
     }
 }
 
-/// How specific a term is: of two that explain a recording equally well the one with a name of its own is meant.
+/// How specific a term is: of two that explain a recording equally well the one with a name of its own is meant, and where the
+/// same name may enter two equations, that of the variable it is a function of.
 pub(crate) fn rank(spec: &ModelSpec, found: &Fitted) -> u8 {
-    let place = match found.lead.place {
-        Place::Equation(_) | Place::Input(_) => 0,
-        Place::Parameter(_) => 1,
+    let variables: Vec<VariableId> = found.depends.iter().filter_map(|n| spec.find(n)).collect();
+    rank_of(spec, found.lead.term, found.lead.place, &variables)
+}
+
+/// Ranks below this are names of their own.
+pub(super) const SPECIFIC: u8 = 2;
+
+/// The rank of a term at a place, as a function of variables.
+pub(super) fn rank_of(spec: &ModelSpec, term: &Term, place: Place, variables: &[VariableId]) -> u8 {
+    let (of_place, elsewhere) = match place {
+        Place::Equation(_) => {
+            let own = variables.is_empty() || variables.contains(&place.variable(spec));
+            (0, u8::from(!own && term.port == Port::Equation))
+        }
+        Place::Input(_) => (0, 0),
+        Place::Parameter(_) => (1, 0),
     };
-    match named(spec, found) {
-        "load_step" if found.lead.term.id != "load_step" => 3 + place,
-        "law" | "cross_coupling" => 4 + place,
-        "input_curve" | "parameter_change" => 2 + place,
-        _ => place,
-    }
+    let of_name = match name_of(spec, term, place, variables) {
+        "load_step" if term.id != "load_step" => 3 + of_place,
+        "law" | "cross_coupling" => 4 + of_place,
+        "input_curve" | "parameter_change" => 2 + of_place,
+        _ => of_place,
+    };
+    2 * of_name + elsewhere
 }

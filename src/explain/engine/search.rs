@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::candidate::{Candidate, candidate};
 use super::library::Starts;
-use super::names::{named, rank};
+use super::names::{SPECIFIC, named, rank, rank_of};
 use super::screen::{Lead, Screen, screen};
 use crate::physics::estimate::{
     Effort, EstimateError, EstimateOptions, Fit, PlantRecording, Study,
@@ -19,16 +19,19 @@ const AT_A_PLACE: usize = 8;
 /// The best lead of each term is fitted too where its statistic is at least this part of the best.
 const IMITATED: f64 = 0.3;
 const GLANCE: Effort = Effort {
-    iterations: 8,
+    iterations: 4,
     settled: 0.3,
 };
-/// The best of these are fitted with a noise model of their own.
+/// Error of a step where fits are only compared with each other.
+const GLANCED_ACCURACY: f64 = 1e-6;
+/// The best of these are fitted with a noise model of their own, and the best of them until nothing changes.
 const FITTED: usize = 8;
+const FINISHED: usize = 8;
 const THOROUGH: Effort = Effort {
     iterations: 20,
     settled: 0.05,
 };
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 2;
 /// Gain in Schwarz's criterion that is needed, beyond the penalty for what was searched: odds of e^8 (math/physics.md).
 pub(crate) const NEEDED: f64 = 16.0;
 /// A second effect must gain more, and at least this part of the first.
@@ -44,8 +47,13 @@ pub(crate) struct Fitted {
     pub lead: Lead,
     /// What the term is a function of.
     pub depends: Vec<String>,
-    /// Values that the argument had.
+    /// The same as an expression.
+    pub argument: String,
+    /// Values that the argument had, and the range of its integral.
     pub range: (f64, f64),
+    pub travel: f64,
+    /// Fitted values of the shapes.
+    pub shapes: Vec<f64>,
     pub candidate: Candidate,
     pub fit: Fit,
     /// Gain in the criterion over the plant without it, less the penalty of the search.
@@ -76,7 +84,7 @@ fn searched(lead: &Lead, recordings: &[PlantRecording]) -> f64 {
             Starts::Length(_) => 2.0 * (samples / 20.0).ln(),
             Starts::Waves(_) => 7.0,
             Starts::Quantiles(_) | Starts::SizeQuantiles(_) => 2.5,
-            Starts::Spread(_) | Starts::Samples(_) => 2.0,
+            Starts::Spread(_) | Starts::Samples(_) | Starts::Travel(_) | Starts::Rate(_) => 2.0,
             Starts::Values(_) => 0.0,
         })
         .sum()
@@ -107,6 +115,7 @@ fn promising(screen: &Screen) -> Vec<Lead> {
             kept.push(lead.clone());
         }
     }
+    kept.extend(screen.curves.iter().cloned());
     kept
 }
 
@@ -126,7 +135,7 @@ fn step(
         tried.push((s, fit.clone()));
     }
     let strongest = tried.first().map_or((0.0, 0), |(s, _)| {
-        (s.leads.first().map_or(0.0, |l| l.statistic), s.leads.len())
+        (s.leads.first().map_or(0.0, |l| l.statistic), s.tests)
     });
     // A noise model that was fitted where physics is missing absorbs it: the same again under white noise.
     if let Some(white) = study.least_squares(&fit.point)
@@ -147,7 +156,8 @@ fn step(
         .filter_map(|(i, screen, from, lead)| {
             let made = candidate(&plant.spec, &lead, &screen.arguments, recordings)?;
             let options = with_more(options, made.values.len());
-            let inner = Study::new(&made.plant, recordings, &options).ok()?;
+            let rough = made.plant.clone().with_accuracy(GLANCED_ACCURACY);
+            let inner = Study::new(&rough, recordings, &options).ok()?;
             let start = made.from(from, parameters, states, outputs);
             let fitted = inner.refit(&start, 0, GLANCE)?;
             Some((from.deviance - fitted.deviance, lead, i, made, fitted))
@@ -160,7 +170,11 @@ fn step(
         let most = list.first().map_or(0.0, |g| g.0);
         let close = |g: &&_| {
             let (gain, lead, ..): &(f64, Lead, usize, Candidate, Fit) = g;
-            *gain > (1.0 - TIE.1) * most && lead.term.has_a_name()
+            let variables = lead
+                .argument
+                .map_or(&[][..], |a| &tried[which].0.arguments[a].variables);
+            let specific = rank_of(&plant.spec, lead.term, lead.place, variables) < SPECIFIC;
+            *gain > (1.0 - TIE.1) * most && specific
         };
         let best = list.iter().take(FITTED);
         let others = list.iter().skip(FITTED).copied().filter(close);
@@ -170,7 +184,7 @@ fn step(
                 .map(|g| (g.1.clone(), g.2, g.3.clone(), g.4.clone())),
         );
     }
-    let mut fitted: Vec<Fitted> = chosen
+    let fitted: Vec<Fitted> = chosen
         .into_par_iter()
         .filter_map(|(lead, which, made, from)| {
             let arguments = &tried[which].0.arguments;
@@ -190,7 +204,7 @@ fn step(
                 },
                 ..from
             };
-            let best = inner.refit(&from, ROUNDS, THOROUGH)?;
+            let best = inner.refit(&from, 1, THOROUGH)?;
             let gain = fit.criterion - best.criterion - searched(&lead, recordings);
             let argument = lead.argument.map(|a| &arguments[a]);
             Some(Fitted {
@@ -200,7 +214,10 @@ fn step(
                         .map(|&v| plant.spec.variable(v).name.clone())
                         .collect()
                 }),
+                argument: argument.map_or_else(String::new, |a| a.expression.clone()),
                 range: argument.map_or((0.0, 0.0), |a| (a.quantile(0.0), a.quantile(1.0))),
+                travel: argument.map_or(0.0, |a| a.travel(recordings[0].sample_time)),
+                shapes: best.point[parameters..][..lead.shapes.len()].to_vec(),
                 lead,
                 candidate: made,
                 fit: best,
@@ -208,7 +225,7 @@ fn step(
             })
         })
         .collect();
-    fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut fitted = finished(fitted, fit, recordings, options);
     // Among those that explain the recording as well as the best, the one with a name of its own comes first.
     if let Some(best) = fitted.first().map(|f| f.gain) {
         let tie = TIE.0.max(TIE.1 * best);
@@ -216,6 +233,36 @@ fn step(
         fitted[..ties].sort_by_key(|f| rank(&plant.spec, f));
     }
     (fitted, strongest)
+}
+
+/// The best of all fits, fitted until nothing changes; the others as they are. Best first.
+fn finished(
+    mut fitted: Vec<Fitted>,
+    before: &Fit,
+    recordings: &[PlantRecording],
+    options: &EstimateOptions,
+) -> Vec<Fitted> {
+    fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let refined: Vec<Option<Fit>> = fitted
+        .par_iter()
+        .take(FINISHED)
+        .map(|f| {
+            let options = with_more(options, f.candidate.values.len());
+            let inner = Study::new(&f.candidate.plant, recordings, &options).ok()?;
+            inner.refit(&f.fit, ROUNDS, THOROUGH)
+        })
+        .collect();
+    for (f, refined) in fitted.iter_mut().zip(refined) {
+        let Some(refined) = refined else { continue };
+        if refined.criterion < f.fit.criterion {
+            f.gain = before.criterion - refined.criterion - searched(&f.lead, recordings);
+            let first = options.free.len();
+            f.shapes = refined.point[first..][..f.lead.shapes.len()].to_vec();
+            f.fit = refined;
+        }
+    }
+    fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    fitted
 }
 
 fn with_more(options: &EstimateOptions, count: usize) -> EstimateOptions {

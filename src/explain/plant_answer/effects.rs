@@ -3,16 +3,19 @@
 use std::collections::BTreeMap;
 
 use super::Answer;
+use crate::explain::engine::curve::piece;
 use crate::explain::engine::edit::{Place, user_of};
 use crate::explain::engine::library::Port;
 use crate::explain::engine::names::named;
-use crate::explain::engine::screen::filled;
 use crate::explain::engine::search::{Fitted, NEEDED};
+use crate::explain::engine::values::filled;
 use crate::explain::explanation::{Alternative, EffectFound, Evidence, Law, Quantity, Verdict};
-use crate::physics::{Excitation, Hold, Plant};
+use crate::physics::{Excitation, Hold, Plant, parse};
 
 /// Points of a law.
 const LAW_POINTS: usize = 41;
+/// Step of the differences that give a law's slopes, as a part of a parameter.
+const DIFFERENCE: f64 = 1e-4;
 
 impl Answer<'_> {
     pub(super) fn effect(&self, step: usize, fitted: &Fitted) -> Option<EffectFound> {
@@ -97,10 +100,10 @@ impl Answer<'_> {
         })
     }
 
-    /// What is added to an equation, as a curve of its one argument.
+    /// What is added to an equation, as a curve of its one argument, with its standard deviation.
     fn law(&self, fitted: &Fitted) -> Option<Law> {
         let term = fitted.lead.term;
-        if term.port != Port::Equation || term.memory.is_some() || fitted.depends.len() != 1 {
+        if term.port != Port::Equation || !term.memories.is_empty() || fitted.depends.len() != 1 {
             return None;
         }
         let spec = &self.found.plant.spec;
@@ -109,37 +112,46 @@ impl Answer<'_> {
             .iter()
             .map(|&v| spec.variable(v).name.as_str())
             .collect();
-        let shapes: Vec<String> = fitted
+        let at_point: Vec<usize> = fitted
             .candidate
             .names
             .iter()
             .filter_map(|n| names.iter().position(|m| m == n))
-            .map(|at| format!("({:e})", self.found.fit.point[at]))
             .collect();
-        let strength = shapes.last()?;
-        let text = filled(term.form, term, "z", "", &shapes, 1.0);
-        let curve = crate::physics::parse(&format!(
-            "model Law input Real z; output Real y; equation y = {strength}*({text}); end Law;"
-        ))
-        .ok()?;
+        let values: Vec<f64> = at_point.iter().map(|&i| self.found.fit.point[i]).collect();
         let (low, high) = fitted.range;
         let at: Vec<f64> = (0..LAW_POINTS)
             .map(|i| low + (high - low) * i as f64 / (LAW_POINTS - 1) as f64)
             .collect();
-        let inputs = [at.as_slice()];
-        let excitation = Excitation {
-            inputs: &inputs,
-            length: LAW_POINTS,
-            sample_time: 1.0,
-            start_time: 0.0,
-            hold: Hold::Zero,
-        };
-        let plant = Plant::new(curve);
-        let run = plant.simulate(&plant.nominal(), &excitation, None).ok()?;
+        let value = curve_of(fitted, &values, &at)?;
+        let covariance = self.whole.covariance(&self.found.fit);
+        let mut slopes = Vec::new();
+        for (i, &p) in at_point.iter().enumerate() {
+            let step = DIFFERENCE * (values[i].abs() + covariance[(p, p)].max(0.0).sqrt());
+            let mut moved = values.clone();
+            moved[i] += step;
+            let there = curve_of(fitted, &moved, &at)?;
+            slopes.push(
+                there
+                    .iter()
+                    .zip(&value)
+                    .map(|(a, b)| if step > 0.0 { (a - b) / step } else { 0.0 })
+                    .collect::<Vec<f64>>(),
+            );
+        }
+        let std = (0..at.len()).map(|k| {
+            let mut variance = 0.0;
+            for (i, &p) in at_point.iter().enumerate() {
+                for (j, &q) in at_point.iter().enumerate() {
+                    variance += slopes[i][k] * covariance[(p, q)] * slopes[j][k];
+                }
+            }
+            variance.max(0.0).sqrt()
+        });
         Some(Law {
             variable: fitted.depends[0].clone(),
-            std: vec![0.0; LAW_POINTS],
-            value: run.outputs.into_iter().next()?,
+            std: std.collect(),
+            value,
             at,
         })
     }
@@ -174,6 +186,42 @@ impl Answer<'_> {
         }
         all
     }
+}
+
+/// What a term adds where its argument has these values.
+fn curve_of(fitted: &Fitted, values: &[f64], at: &[f64]) -> Option<Vec<f64>> {
+    if let Some(curve) = &fitted.lead.curve {
+        let pieces = |z: f64| -> f64 {
+            let each = values.iter().enumerate();
+            each.map(|(i, v)| v * piece(&curve.knots, i, z)).sum()
+        };
+        return Some(at.iter().map(|&z| pieces(z)).collect());
+    }
+    let term = fitted.lead.term;
+    let shapes: Vec<String> = values.iter().map(|v| format!("({v:e})")).collect();
+    let strength = shapes.last()?;
+    let text = filled(
+        term.form,
+        term,
+        &fitted.argument.replace(&fitted.depends[0], "z"),
+        &[],
+        &shapes,
+        1.0,
+    );
+    let text = format!(
+        "model Law input Real z; output Real y; equation y = {strength}*({text}); end Law;"
+    );
+    let inputs = [at];
+    let excitation = Excitation {
+        inputs: &inputs,
+        length: at.len(),
+        sample_time: 1.0,
+        start_time: 0.0,
+        hold: Hold::Zero,
+    };
+    let plant = Plant::new(parse(&text).ok()?);
+    let run = plant.simulate(&plant.nominal(), &excitation, None).ok()?;
+    run.outputs.into_iter().next()
 }
 
 /// The id in words, as a sentence begins with it.

@@ -72,6 +72,8 @@ pub(super) struct StepControl<'p> {
     /// Difference of the derivatives at the end of a step, by the last stage and by the result, up to which two half steps have
     /// agreed with it: steps below it are accepted without them.
     trusted: f64,
+    /// Error of the step that was trusted last, as a part of that difference.
+    per_indication: f64,
     /// Largest argument of each switch so far.
     largest: Vec<f64>,
     /// True when the ramps are to be found.
@@ -141,6 +143,7 @@ impl<'p> StepControl<'p> {
             error: vec![0.0; n],
             tolerance: plant.accuracy,
             trusted: 0.0,
+            per_indication: 0.0,
             largest: vec![0.0; plant.tape.switches.len()],
             rough,
             middle: room.clone(),
@@ -380,7 +383,7 @@ impl<'p> StepControl<'p> {
             }
             let indication = worst(&self.error, &self.allowed);
             if indication <= self.trusted {
-                indication / self.trusted
+                indication * self.per_indication
             } else {
                 stages.explicit(field, time, &half, x, first, &mut self.middle);
                 let middle = time.plus(0.5 * step, &one);
@@ -397,11 +400,12 @@ impl<'p> StepControl<'p> {
                     *e = a.value - b.value;
                 }
                 let error = worst(&self.error, &self.allowed);
-                self.trusted = match error {
-                    e if e <= TRUSTED => indication.min(MOST_TRUSTED),
-                    e if e <= 1.0 => self.trusted,
-                    _ => self.trusted.min(0.5 * indication),
-                };
+                if error <= TRUSTED {
+                    self.trusted = indication.min(MOST_TRUSTED);
+                    self.per_indication = error / indication.max(f64::MIN_POSITIVE);
+                } else if error > 1.0 {
+                    self.trusted = self.trusted.min(0.5 * indication);
+                }
                 // The frame holds the end of the step again.
                 field.evaluate(&end, next, &mut self.end);
                 error

@@ -1,0 +1,186 @@
+//! A function that nobody listed, as straight pieces between knots.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::argument::Argument;
+use super::edit::{Place, literal};
+use super::library::{CURVE, Port};
+use super::path::{Hooked, Path};
+use super::projection::Projection;
+use super::screen::Lead;
+
+/// Knots of a curve: half of them at quantiles, half at equal distances.
+const KNOTS: usize = 9;
+/// Knots that are nearer than this part of the range are one.
+const NEAREST: f64 = 0.03;
+/// Places and arguments that are tried: those of the best terms.
+const PAIRS: usize = 4;
+/// Added to the diagonal of the regression, as a part of it: the straight part of a curve may be what parameters do.
+const RIDGE: f64 = 1e-6;
+
+/// Knots of a curve, and its values there.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Curve {
+    pub knots: Vec<f64>,
+    pub values: Vec<f64>,
+}
+
+/// Knots over the values of an argument.
+fn knots(argument: &Argument) -> Vec<f64> {
+    let (low, high) = (argument.quantile(0.0), argument.quantile(1.0));
+    let mut all: Vec<f64> = (0..KNOTS)
+        .map(|i| {
+            let part = i as f64 / (KNOTS - 1) as f64;
+            0.5 * (argument.quantile(part) + low + part * (high - low))
+        })
+        .collect();
+    all.dedup_by(|b, a| *b - *a < NEAREST * (high - low));
+    all
+}
+
+/// Value at `z` of the piece around a knot: 1 there, 0 at its neighbours, level beyond the ends.
+pub(crate) fn piece(knots: &[f64], i: usize, z: f64) -> f64 {
+    let rise = i
+        .checked_sub(1)
+        .map_or(1.0, |b| (z - knots[b]) / (knots[i] - knots[b]));
+    let fall = knots.get(i + 1).map_or(1.0, |a| (a - z) / (a - knots[i]));
+    rise.min(fall).clamp(0.0, 1.0)
+}
+
+/// The same as text.
+fn piece_text(knots: &[f64], i: usize, z: &str) -> String {
+    let rise = i.checked_sub(1).map(|b| {
+        let width = literal(knots[i] - knots[b]);
+        format!("({z} - ({}))/{width}", literal(knots[b]))
+    });
+    let fall = knots.get(i + 1).map(|&a| {
+        let width = literal(a - knots[i]);
+        format!("(({}) - {z})/{width}", literal(a))
+    });
+    match (rise, fall) {
+        (Some(r), Some(f)) => format!("max(0, min({r}, {f}))"),
+        (Some(one), None) | (None, Some(one)) => format!("max(0, min(1, {one}))"),
+        (None, None) => "1.0".to_owned(),
+    }
+}
+
+impl Curve {
+    /// The curve as text, with names for its values.
+    pub fn text(&self, z: &str, names: &[String]) -> String {
+        let pieces = names.iter().enumerate();
+        let each = pieces.map(|(i, name)| format!("{name}*{}", piece_text(&self.knots, i, z)));
+        each.collect::<Vec<_>>().join(" + ")
+    }
+}
+
+/// Curves at the places and of the arguments of the best terms.
+pub(super) fn curves(
+    leads: &[Lead],
+    arguments: &[Argument],
+    hooked: &Hooked,
+    path: &Path,
+    projection: &Projection,
+    gain: Option<&DMatrix<f64>>,
+    whiten: &(dyn Fn(&crate::noise::Series) -> Vec<f64> + Sync),
+) -> Vec<Lead> {
+    let mut pairs: Vec<(Place, usize)> = Vec::new();
+    for lead in leads {
+        let Some(argument) = lead.argument else {
+            continue;
+        };
+        let of_one = !arguments[argument].product && !arguments[argument].absolute;
+        let fits = lead.term.port == Port::Equation && lead.term.memories.is_empty() && of_one;
+        if fits && !pairs.contains(&(lead.place, argument)) {
+            pairs.push((lead.place, argument));
+        }
+        if pairs.len() == PAIRS {
+            break;
+        }
+    }
+    let each = pairs.into_iter().filter_map(|(place, at)| {
+        let argument = &arguments[at];
+        let hook = hooked.places.iter().position(|p| *p == place)?;
+        let knots = knots(argument);
+        let columns: Vec<Vec<f64>> = (0..knots.len())
+            .map(|i| {
+                let signal: Vec<Vec<f64>> = argument
+                    .values
+                    .iter()
+                    .map(|values| values.iter().map(|&z| piece(&knots, i, z)).collect())
+                    .collect();
+                let held = argument.held;
+                let mut column = whiten(&path.propagate(hooked.columns[hook], &signal, held, gain));
+                projection.off(&mut column);
+                column
+            })
+            .collect();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let m = columns.len();
+        let mut normal = DMatrix::from_fn(m, m, |i, j| dot(&columns[i], &columns[j]));
+        let level = normal.diagonal().max();
+        (0..m).for_each(|i| normal[(i, i)] += RIDGE * level);
+        let right = DVector::from_fn(m, |i, _| dot(&columns[i], &projection.residual));
+        let values = normal.cholesky()?.solve(&right);
+        let statistic = values.dot(&right);
+        (statistic.is_finite() && m > 2).then(|| {
+            Lead::of_curve(
+                &CURVE,
+                place,
+                at,
+                Curve {
+                    knots,
+                    values: values.iter().copied().collect(),
+                },
+                statistic,
+            )
+        })
+    });
+    let mut found: Vec<Lead> = each.collect();
+    found.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::{Excitation, Hold, Plant, parse};
+
+    #[test]
+    fn text_and_values_of_a_curve_agree() {
+        let knots = vec![-2.0, -0.5, 0.25, 3.0];
+        let values = [1.0, -2.0, 0.5, 4.0];
+        let curve = Curve {
+            knots: knots.clone(),
+            values: values.to_vec(),
+        };
+        let names: Vec<String> = values
+            .iter()
+            .map(|v| format!("({})", literal(*v)))
+            .collect();
+        let text = format!(
+            "model M input Real z; output Real y; equation y = {}; end M;",
+            curve.text("z", &names)
+        );
+        let plant = Plant::new(parse(&text).unwrap());
+        let at: Vec<f64> = (0..60).map(|i| -3.0 + 0.12 * f64::from(i)).collect();
+        let run = plant
+            .simulate(
+                &plant.nominal(),
+                &Excitation {
+                    inputs: &[&at],
+                    length: at.len(),
+                    sample_time: 1.0,
+                    start_time: 0.0,
+                    hold: Hold::Zero,
+                },
+                None,
+            )
+            .unwrap();
+        for (z, y) in at.iter().zip(&run.outputs[0]) {
+            let sum: f64 = (0..4).map(|i| values[i] * piece(&knots, i, *z)).sum();
+            assert!((sum - y).abs() < 1e-12, "{z}: {sum} {y}");
+        }
+        assert_eq!(piece(&knots, 1, -0.5), 1.0);
+        assert_eq!(piece(&knots, 0, -9.0), 1.0);
+    }
+}

@@ -1,0 +1,165 @@
+//! Values of terms along recordings, from the text of the terms.
+
+use super::argument::Argument;
+use super::edit::literal;
+use super::library::{MEMORIES, MemoryStart, Starts, Term};
+use crate::physics::estimate::PlantRecording;
+use crate::physics::{Excitation, Hold, Plant, parse};
+
+/// Error of a step of a term's memory: a score test needs no more.
+const TERM_ACCURACY: f64 = 1e-4;
+/// A memory that follows at once does so in a sample divided by this.
+const FAST: f64 = 5.0;
+
+/// Values that a shape's search starts from.
+fn starts(shape: Starts, argument: Option<&Argument>, recordings: &[PlantRecording]) -> Vec<f64> {
+    let h = recordings.first().map_or(1.0, |r| r.sample_time);
+    let samples = recordings
+        .iter()
+        .map(|r| r.outputs[0].len())
+        .max()
+        .unwrap_or(1);
+    let begin = recordings.first().map_or(0.0, |r| r.start_time);
+    let of = |parts: &[f64], value: &dyn Fn(&Argument, f64) -> f64| -> Vec<f64> {
+        argument.map_or_else(Vec::new, |a| parts.iter().map(|&p| value(a, p)).collect())
+    };
+    match shape {
+        Starts::Quantiles(parts) => of(parts, &|a, p| a.quantile(p)),
+        Starts::SizeQuantiles(parts) => of(parts, &|a, p| a.size_quantile(p)),
+        Starts::Spread(parts) => of(parts, &|a, p| p * a.spread()),
+        Starts::Travel(parts) => of(parts, &|a, p| p * a.travel(h)),
+        Starts::Rate(parts) => of(parts, &|a, p| p * a.range() / h),
+        Starts::Waves(counts) => of(counts, &|_, n| n),
+        Starts::Length(parts) => parts
+            .iter()
+            .map(|p| begin + p * samples as f64 * h)
+            .collect(),
+        Starts::Samples(counts) => counts.iter().map(|c| c * h).collect(),
+        Starts::Values(values) => values.to_vec(),
+    }
+}
+
+/// The combinations of start values of all shapes.
+pub(super) fn grid(
+    term: &Term,
+    argument: Option<&Argument>,
+    recordings: &[PlantRecording],
+) -> Vec<Vec<f64>> {
+    let mut all: Vec<Vec<f64>> = vec![vec![]];
+    for shape in term.shapes {
+        let values = starts(shape.starts, argument, recordings);
+        all = all
+            .into_iter()
+            .flat_map(|head| {
+                values.iter().map(move |&v| {
+                    let mut whole = head.clone();
+                    whole.push(v);
+                    whole
+                })
+            })
+            .filter(|v| v.iter().all(|v| v.is_finite()))
+            .collect();
+    }
+    all.retain(|values| {
+        let positive = term.shapes.iter().zip(values);
+        positive.into_iter().all(|(s, &v)| !s.positive || v > 0.0)
+    });
+    all
+}
+
+/// The form with its names filled in.
+pub(crate) fn filled(
+    form: &str,
+    term: &Term,
+    argument: &str,
+    memories: &[String],
+    shapes: &[String],
+    sample_time: f64,
+) -> String {
+    let mut text = form
+        .replace("{z}", argument)
+        .replace("{fast}", &literal(FAST / sample_time));
+    for (symbol, name) in MEMORIES.iter().zip(memories) {
+        text = text.replace(symbol, name);
+    }
+    for (shape, value) in term.shapes.iter().zip(shapes) {
+        text = text.replace(&format!("{{{}}}", shape.symbol), value);
+    }
+    text
+}
+
+/// A term at an argument with shapes, whose values are asked for.
+pub(super) struct Instance {
+    pub term: &'static Term,
+    pub argument: Option<usize>,
+    pub shapes: Vec<f64>,
+}
+
+/// Values of terms along the recordings.
+pub(super) fn evaluate(
+    instances: &[Instance],
+    arguments: &[Argument],
+    recordings: &[PlantRecording],
+) -> Option<Vec<Vec<Vec<f64>>>> {
+    let h = recordings.first()?.sample_time;
+    let mut used: Vec<usize> = instances.iter().filter_map(|i| i.argument).collect();
+    used.sort_unstable();
+    used.dedup();
+    let mut columns: Vec<Vec<Vec<f64>>> = vec![vec![]; instances.len()];
+    for (r, recording) in recordings.iter().enumerate() {
+        let mut text = String::from("model Terms\n");
+        for a in &used {
+            text.push_str(&format!("input Real z{a};\n"));
+        }
+        let mut equations = String::from("equation\n");
+        for (i, instance) in instances.iter().enumerate() {
+            let name = instance.argument.map_or(String::new(), |a| format!("z{a}"));
+            let shapes: Vec<String> = instance
+                .shapes
+                .iter()
+                .map(|v| format!("({})", literal(*v)))
+                .collect();
+            let memories: Vec<String> = (0..instance.term.memories.len())
+                .map(|j| format!("m{i}_{j}"))
+                .collect();
+            let fill = |form: &str| filled(form, instance.term, &name, &memories, &shapes, h);
+            text.push_str(&format!("output Real b{i};\n"));
+            equations.push_str(&format!("b{i} = {};\n", fill(instance.term.form)));
+            for (memory, name) in instance.term.memories.iter().zip(&memories) {
+                let first = instance.argument.map_or(0.0, |a| arguments[a].values[r][0]);
+                let start = literal(memory.start.at(first));
+                text.push_str(&format!("Real {name}(start={start}, fixed=true);\n"));
+                equations.push_str(&format!("der({name}) = {};\n", fill(memory.rate)));
+            }
+        }
+        let plant = Plant::new(parse(&format!("{text}{equations}end Terms;\n")).ok()?)
+            .with_accuracy(TERM_ACCURACY);
+        let inputs: Vec<&[f64]> = used
+            .iter()
+            .map(|&a| arguments[a].values[r].as_slice())
+            .collect();
+        let excitation = Excitation {
+            inputs: &inputs,
+            length: recording.outputs[0].len(),
+            sample_time: h,
+            start_time: recording.start_time,
+            hold: Hold::Linear,
+        };
+        let run = plant.simulate(&plant.nominal(), &excitation, None).ok()?;
+        for (to, column) in columns.iter_mut().zip(run.outputs) {
+            to.push(column);
+        }
+    }
+    Some(columns)
+}
+
+impl MemoryStart {
+    /// The start where the argument has this value.
+    pub fn at(self, argument: f64) -> f64 {
+        match self {
+            Self::Argument => argument,
+            Self::Square => argument * argument,
+            Self::Zero => 0.0,
+        }
+    }
+}
