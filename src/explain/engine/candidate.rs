@@ -1,7 +1,7 @@
 //! A lead made into a plant that can be fitted.
 
 use super::argument::Argument;
-use super::edit::{Edit, NewParameter, Place, literal};
+use super::edit::{Edit, NewParameter, Place, acting, literal};
 use super::library::{Port, Starts};
 use super::screen::Lead;
 use super::values::filled;
@@ -163,9 +163,7 @@ fn equation_text(changed: &ModelSpec, spec: &ModelSpec, place: Place) -> String 
     let variable = place.variable(spec);
     let name = match place {
         Place::Equation(_) => spec.variable(variable).name.clone(),
-        Place::Input(_) | Place::Parameter(_) => {
-            format!("{}_acting", spec.variable(variable).column())
-        }
+        Place::Input(_) | Place::Parameter(_) => acting(spec, variable),
     };
     let equation = changed
         .equations

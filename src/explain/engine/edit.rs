@@ -162,7 +162,7 @@ impl Edit {
             match *place {
                 Place::Equation(_) => {}
                 Place::Input(v) | Place::Parameter(v) => {
-                    let name = format!("{}_acting", spec.variable(v).column());
+                    let name = acting(spec, v);
                     declarations.push_str(&format!("  Real {name};\n"));
                     let value = form.replace("{v}", &spec.variable(v).name);
                     equations.push_str(&format!("  {name} = {value};\n"));
@@ -224,6 +224,16 @@ impl Edit {
     }
 }
 
+/// Name of what acts in place of an input or a parameter: one that the plant does not have.
+pub(crate) fn acting(spec: &ModelSpec, v: VariableId) -> String {
+    let wanted = format!("{}_acting", spec.variable(v).column());
+    let numbered = (2..).map(|n| format!("{wanted}{n}"));
+    std::iter::once(wanted.clone())
+        .chain(numbered)
+        .find(|name| spec.find(name).is_none())
+        .unwrap_or(wanted)
+}
+
 /// Whether an expression needs no parentheses as a term of a sum.
 fn simple(text: &str) -> bool {
     !text.trim_start().starts_with("if") && !text.contains("if ")
@@ -242,8 +252,9 @@ fn substituted(text: &str, part: Span, mut pieces: Vec<(Span, String)>) -> Strin
     out
 }
 
-/// Where effects may enter: every equation that is no definition and no plain sensor, every input, every parameter.
-pub(crate) fn places(spec: &ModelSpec) -> Vec<Place> {
+/// Where effects may enter: every equation that is no definition and no plain sensor, every input, and of the parameters the
+/// first `own`, but for those that are times of delays.
+pub(crate) fn places(spec: &ModelSpec, own: usize) -> Vec<Place> {
     let mut found = Vec::new();
     for (at, equation) in spec.equations.iter().enumerate() {
         let plain = equation.coefficient.is_none()
@@ -258,8 +269,27 @@ pub(crate) fn places(spec: &ModelSpec) -> Vec<Place> {
             .filter(|&v| !uses(spec, v).is_empty())
             .map(Place::Input),
     );
-    found.extend(spec.parameters().into_iter().map(Place::Parameter));
+    let parameters = spec.parameters().into_iter().take(own);
+    found.extend(
+        parameters
+            .filter(|&v| !delays(spec, v))
+            .map(Place::Parameter),
+    );
     found
+}
+
+/// Whether the time of a delay uses a parameter.
+fn delays(spec: &ModelSpec, parameter: VariableId) -> bool {
+    let spans = uses(spec, parameter);
+    spec.expressions.any(|node| match node {
+        Node::Delay { time, .. } => {
+            let inside = spec.expressions.span(*time);
+            spans
+                .iter()
+                .any(|s| inside.start <= s.start && s.end <= inside.end)
+        }
+        _ => false,
+    })
 }
 
 /// The variable whose equation uses a parameter first; the parameter itself where none does.
@@ -320,7 +350,7 @@ end Tank;
     #[test]
     fn every_place_can_be_changed() {
         let spec = parse(TANK).unwrap();
-        let places = places(&spec);
+        let places = places(&spec, 2);
         assert_eq!(places.len(), 6, "{places:?}");
         for place in places {
             let edit = term(place, "{v} + c*1.0");

@@ -390,7 +390,7 @@ pub(crate) const TERMS: &[Term] = &[
                 start: MemoryStart::Argument,
             },
             Memory {
-                rate: "{fast}*(0.5 + 0.5*tanh(20*(abs({z} - {m})/{S} - 1 + 0.9*{p})) - {p})",
+                rate: "{fast}*(0.5 + 0.5*tanh(8*(abs({z} - {m})/{S} - 1 + 0.9*{p})) - {p})",
                 start: MemoryStart::Zero,
             },
         ],

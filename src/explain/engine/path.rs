@@ -26,8 +26,8 @@ pub(super) struct Hooked {
     pub columns: Vec<usize>,
 }
 
-pub(super) fn hooked(spec: &ModelSpec, arguments: &[Argument]) -> Option<Hooked> {
-    let places = places(spec);
+pub(super) fn hooked(spec: &ModelSpec, own: usize, arguments: &[Argument]) -> Option<Hooked> {
+    let places = places(spec, own);
     let mut edit = Edit::default();
     let mut columns = Vec::new();
     let inputs = spec.inputs();

@@ -90,11 +90,16 @@ pub(crate) struct Screen {
     pub arguments: Vec<Argument>,
 }
 
-/// Tests every term at every place.
-pub(crate) fn screen(study: &Study, fit: &Fit, recordings: &[PlantRecording]) -> Option<Screen> {
+/// Tests every term at every place; of the parameters the first `own` are the plant's, the others those of effects.
+pub(crate) fn screen(
+    study: &Study,
+    fit: &Fit,
+    own: usize,
+    recordings: &[PlantRecording],
+) -> Option<Screen> {
     let spec = &study.plant().spec;
     let mut arguments = arguments(spec);
-    let hooked = hooked(spec, &arguments)?;
+    let hooked = hooked(spec, own, &arguments)?;
     let path = path(study, fit, &hooked, recordings, &mut arguments)?;
     let projection = Projection::new(study, fit)?;
     let gain = study.gain(fit);

@@ -124,6 +124,7 @@ fn step(
     plant: &Plant,
     study: &Study,
     fit: &Fit,
+    own: usize,
     recordings: &[PlantRecording],
     options: &EstimateOptions,
 ) -> (Vec<Fitted>, (f64, usize)) {
@@ -131,7 +132,7 @@ fn step(
     let parameters = study.parameters();
     let outputs = study.outputs();
     let mut tried: Vec<(Screen, Fit)> = Vec::new();
-    if let Some(s) = screen(study, fit, recordings) {
+    if let Some(s) = screen(study, fit, own, recordings) {
         tried.push((s, fit.clone()));
     }
     let strongest = tried.first().map_or((0.0, 0), |(s, _)| {
@@ -139,7 +140,7 @@ fn step(
     });
     // A noise model that was fitted where physics is missing absorbs it: the same again under white noise.
     if let Some(white) = study.least_squares(&fit.point)
-        && let Some(s) = screen(study, &white, recordings)
+        && let Some(s) = screen(study, &white, own, recordings)
     {
         tried.push((s, white));
     }
@@ -292,10 +293,11 @@ pub(crate) fn search(
     let mut now = plant.clone();
     let mut fit = baseline.clone();
     let mut left = (0.0, 0);
+    let own = plant.spec.parameters().len();
     let mut accepted_so_far = 0;
     for count in 0..=MOST {
         let study = Study::new(&now, recordings, &options)?;
-        let (fitted, strongest) = step(&now, &study, &fit, recordings, &options);
+        let (fitted, strongest) = step(&now, &study, &fit, own, recordings, &options);
         left = strongest;
         let needed = match steps.first().and_then(|s| s.first()) {
             None => NEEDED,
