@@ -113,7 +113,7 @@ impl Answer<'_> {
         let mut explanation = Explanation {
             format: EXPLANATION_FORMAT.to_owned(),
             verdict,
-            probability: probability(finding),
+            probability: probability(finding, &fit),
             summary: Vec::new(),
             effects: if verdict == Verdict::Unexplained {
                 Vec::new()
