@@ -9,6 +9,7 @@ mod align;
 mod batch;
 mod check;
 mod completions;
+mod effects;
 mod explain;
 mod identify;
 mod model_flags;
@@ -84,6 +85,7 @@ enum Command {
     Identify(identify::Flags),
     Batch(batch::Flags),
     Explain(explain::Flags),
+    Effects(effects::Flags),
     Validate(validate::Flags),
     Simulate(simulate::Flags),
     Check(check::Flags),
@@ -137,6 +139,7 @@ fn dispatch(cli: Cli) -> anyhow::Result<Outcome> {
         Some(Command::Identify(flags)) => identify::run(flags, say),
         Some(Command::Batch(flags)) => batch::run(flags, say),
         Some(Command::Explain(flags)) => explain::run(flags, say),
+        Some(Command::Effects(flags)) => effects::run(&flags),
         Some(Command::Validate(flags)) => validate::run(flags, say),
         Some(Command::Simulate(flags)) => simulate::run(flags, say),
         Some(Command::Check(flags)) => check::run(&flags, say),

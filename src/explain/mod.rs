@@ -76,6 +76,7 @@ mod weak;
 mod words;
 
 pub use augmented::AugmentedError;
+pub use engine::documentation::{Imitation, PLANT_EFFECTS, PlantEffect, plant_effect};
 pub use error::ExplainError;
 pub use explanation::{
     Alternative, AugmentedModel, AugmentedPlant, Curve, Detectable, EXPLANATION_FORMAT,

@@ -3,6 +3,7 @@
 pub(crate) mod argument;
 pub(crate) mod candidate;
 pub(crate) mod curve;
+pub(crate) mod documentation;
 pub(crate) mod edit;
 pub(crate) mod library;
 pub(crate) mod names;

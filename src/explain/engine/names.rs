@@ -59,7 +59,7 @@ fn unused(spec: &ModelSpec, v: VariableId) -> bool {
 /// The id of what was found in a plant; `law` for a function that has no name there.
 pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
     let variables: Vec<VariableId> = found.depends.iter().filter_map(|n| spec.find(n)).collect();
-    let id = name_of(spec, found.lead.term, found.lead.place, &variables);
+    let id = called(spec, found.lead.term, found.lead.place, &variables);
     // Values of the fit decide between names of one term.
     let low = |shape: f64| shape < 0.5 * (found.range.0 + found.range.1);
     match (id, found.shapes.first()) {
@@ -76,8 +76,9 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
 /// Bristles that yield within this part of the travel are dry friction.
 const YIELDS: f64 = 0.12;
 
-/// The id of a term at a place, as a function of variables.
-pub(super) fn name_of(
+/// The id of a term at a place, as a function of variables. Each is described in
+/// [`documentation`](super::documentation).
+pub(crate) fn called(
     spec: &ModelSpec,
     term: &Term,
     place: Place,
@@ -176,7 +177,7 @@ pub(super) fn rank_of(spec: &ModelSpec, term: &Term, place: Place, variables: &[
         Place::Input(_) => (0, 0),
         Place::Parameter(_) => (1, 0),
     };
-    let of_name = match name_of(spec, term, place, variables) {
+    let of_name = match called(spec, term, place, variables) {
         "load_step" if term.id != "load_step" => 3 + of_place,
         "law" | "cross_coupling" => 4 + of_place,
         "input_curve" | "parameter_change" => 2 + of_place,

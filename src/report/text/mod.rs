@@ -1,5 +1,6 @@
 //! Tables for people: nothing wider than a hundred columns.
 
+mod effects_text;
 mod explanation_text;
 mod linearisation_text;
 mod model_text;
@@ -14,6 +15,7 @@ mod table;
 mod validation_text;
 mod verdict;
 
+pub use effects_text::{UnknownId, effects_text};
 pub use explanation_text::explanation_text;
 pub use linearisation_text::linearisation_text;
 pub use model_text::{ModelText, model_text};

@@ -1,0 +1,106 @@
+//! The table and the names hold together.
+
+use std::collections::BTreeSet;
+
+use super::*;
+use crate::explain::engine::argument::arguments;
+use crate::explain::engine::edit::{Place, places, sensors};
+use crate::explain::engine::library::{Needs, Port, TERMS};
+use crate::explain::engine::names::called;
+use crate::explain::engine::screen::Lead;
+use crate::physics::parse;
+
+/// Plants that between them have every kind of place and argument that a name depends on.
+const PLANTS: [&str; 3] = [
+    "model Motor
+       parameter Real R(unit=\"Ohm\") = 1; parameter Real J = 1;
+       input Real u(unit=\"V\"); input Real d(unit=\"N.m\"); output Real y(unit=\"rad\");
+       Real phi(unit=\"rad\"); Real w(unit=\"rad/s\"); Real T(unit=\"K\");
+     equation
+       der(phi) = w; J*der(w) = u/R - w; der(T) = u - T; y = phi;
+     end Motor;",
+    "model Tank
+       parameter Real A = 2; input Real q; output Real y; Real h;
+     equation
+       A*der(h) = q - h; y = 2*h;
+     end Tank;",
+    "model Oven
+       parameter Real k = 1; input Real P(unit=\"W\"); input Real Ta(unit=\"K\"); output Real y(unit=\"K\"); Real T(unit=\"K\");
+     equation
+       der(T) = P - k*(T - Ta); y = T;
+     end Oven;",
+];
+
+fn names() -> BTreeSet<&'static str> {
+    let mut all = BTreeSet::new();
+    for text in PLANTS {
+        let spec = parse(text).unwrap();
+        let sensors = sensors(&spec);
+        let arguments = arguments(&spec);
+        for term in TERMS {
+            let mut at: Vec<(Place, bool)> = match term.port {
+                Port::Sensor => sensors
+                    .iter()
+                    .map(|&s| (Place::Equation(s), true))
+                    .collect(),
+                _ => places(&spec).into_iter().map(|p| (p, false)).collect(),
+            };
+            at.retain(|(place, _)| match term.port {
+                Port::Equation | Port::Sensor => matches!(place, Place::Equation(_)),
+                Port::Input => matches!(place, Place::Input(_)),
+                Port::Parameter => matches!(place, Place::Parameter(_)),
+            });
+            for (place, sensor) in at {
+                let lead = |argument| Lead {
+                    term,
+                    place,
+                    sensor,
+                    argument,
+                    shapes: vec![],
+                    strength: 0.0,
+                    statistic: 0.0,
+                };
+                if term.needs == Needs::Time {
+                    all.insert(called(&spec, &lead(None), &[]));
+                    continue;
+                }
+                for (i, argument) in arguments.iter().enumerate() {
+                    // What an argument must be, as far as that does not depend on a recording.
+                    let serves = match term.needs {
+                        Needs::Temperature => argument.temperature,
+                        Needs::Difference => argument.difference,
+                        Needs::Angle => argument.angle,
+                        _ => true,
+                    };
+                    if serves {
+                        all.insert(called(&spec, &lead(Some(i)), &argument.variables));
+                    }
+                }
+            }
+        }
+    }
+    all
+}
+
+#[test]
+fn every_name_is_described_and_every_description_is_a_name() {
+    let described: BTreeSet<&str> = PLANT_EFFECTS.iter().map(|e| e.id).collect();
+    assert_eq!(described.len(), PLANT_EFFECTS.len(), "an id twice");
+    assert_eq!(names(), described);
+}
+
+#[test]
+fn what_imitates_an_effect_is_described_too() {
+    for effect in PLANT_EFFECTS {
+        assert!(!effect.imitations.is_empty(), "{}", effect.id);
+        for i in effect.imitations {
+            assert!(
+                i.effect == "parameters" || plant_effect(i.effect).is_some(),
+                "{}: {}",
+                effect.id,
+                i.effect
+            );
+            assert!(i.experiment.ends_with('.'), "{}", i.experiment);
+        }
+    }
+}
