@@ -1,71 +1,12 @@
 //! `explain` where the simulation is a plant in equations, on recordings of an integrator of its own.
 
+#[path = "support/cart.rs"]
+mod cart;
 #[path = "support/folder.rs"]
 mod folder;
 
-use std::fmt::Write;
-
+use cart::{CART, explained, explained_with, record};
 use folder::Folder;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
-
-/// A cart on a spring, driven by a force.
-const CART: &str = r#"model Cart "cart on a spring"
-  parameter Real m(unit="kg", min=0.8, max=1.2) = 1.0 "mass";
-  parameter Real k(unit="N/m", min=30, max=50) = 40 "spring";
-  parameter Real d(unit="N.s/m", min=0, max=3) = 1.0 "damper";
-  input Real u(unit="N");
-  output Real y(unit="m");
-  Real x(unit="m", start=0);
-  Real v(unit="m/s", start=0);
-equation
-  der(x) = v;
-  m*der(v) = u - k*x - d*v;
-  y = x;
-end Cart;
-"#;
-
-/// A recording of the cart: `extra` is the force that the equations leave out, of position, speed and time.
-fn record(folder: &Folder, name: &str, mass: f64, extra: impl Fn(f64, f64, f64) -> f64, seed: u64) {
-    const PARTS: usize = 40;
-    let mut dice = ChaCha8Rng::seed_from_u64(seed);
-    let mut normal = || -> f64 { StandardNormal.sample(&mut dice) };
-    let (h, mut x, mut v, mut u) = (0.02, 0.0, 0.0, 0.0);
-    let mut text = String::from("t,u [N],y [m]\n");
-    for sample in 0..2500 {
-        if sample % 25 == 0 {
-            u = 20.0 * normal();
-        }
-        let time = h * f64::from(sample);
-        writeln!(text, "{time},{u},{}", x + 0.004 * normal()).unwrap();
-        for part in 0..PARTS {
-            let step = h / PARTS as f64;
-            let force = |x: f64, v: f64, t: f64| (u - 40.0 * x - 1.0 * v + extra(x, v, t)) / mass;
-            let t = time + step * part as f64;
-            // Heun's method.
-            let a = force(x, v, t);
-            let (x1, v1) = (x + step * v, v + step * a);
-            x += 0.5 * step * (v + v1);
-            v += 0.5 * step * (a + force(x1, v1, t + step));
-        }
-    }
-    folder.text(name, &text);
-}
-
-fn explained(folder: &Folder, log: &str) -> serde_json::Value {
-    let arguments = ["explain", log, "--simulation", "cart.mo"];
-    folder
-        .run(
-            &[
-                &arguments[..],
-                &["--output", "e.json", "--report", "e.html"],
-            ]
-            .concat(),
-        )
-        .ok();
-    serde_json::from_str(&std::fs::read_to_string(folder.join("e.json")).unwrap()).unwrap()
-}
 
 #[test]
 fn a_missing_drag_is_named_in_its_equation_and_can_be_simulated() {
@@ -179,13 +120,73 @@ fn what_is_not_available_with_plants_is_said() {
         "log.csv",
         "--simulation",
         "cart.mo",
-        "--without",
-        "cogging",
+        "--map",
+        "a=y",
     ];
     let said = folder.run(&arguments).error();
-    assert!(said.contains("--without"), "{said}");
+    assert!(said.contains("--map"), "{said}");
     let said = folder
         .run(&["explain", "log.csv", "--simulation", "cart.mo", "other.mo"])
         .error();
     assert!(said.contains("one plant"), "{said}");
+}
+
+#[test]
+fn effects_are_left_out_or_tried_alone() {
+    let folder = Folder::new();
+    folder.text("cart.mo", CART);
+    record(&folder, "log.csv", 1.1, |_, v, _| -2.5 * v * v.abs(), 1);
+    let names = |said: &serde_json::Value| -> Vec<String> {
+        let rivals = said["alternatives"].as_array().unwrap().iter();
+        let effects = said["effects"].as_array().unwrap().iter();
+        let id = |e: &serde_json::Value| e["effect"].as_str().unwrap().to_owned();
+        effects.chain(rivals).map(id).collect()
+    };
+    let said = explained_with(&folder, "log.csv", &["--without", "quadratic_drag"]);
+    let found = names(&said);
+    assert!(!found.contains(&"quadratic_drag".to_owned()), "{found:?}");
+    assert!(found.contains(&"cubic_drag".to_owned()), "{found:?}");
+    let said = explained_with(&folder, "log.csv", &["--only", "end_stop,coulomb_friction"]);
+    let found = names(&said);
+    assert!(
+        found
+            .iter()
+            .all(|f| f == "end_stop" || f == "coulomb_friction"),
+        "{found:?}"
+    );
+    // What may not be named is missing all the same.
+    assert_eq!(said["remaining"]["adequate"], false);
+    for option in ["--without", "--only"] {
+        let arguments = ["explain", "log.csv", "--simulation", "cart.mo"];
+        let unknown = [option, "quadratic_drag,quadratic_damping"];
+        let said = folder.run(&[&arguments[..], &unknown].concat()).error();
+        assert!(
+            said.contains(option)
+                && said.contains("quadratic_damping of plants")
+                && said.contains("cogging"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn the_effects_are_listed_and_described() {
+    let folder = Folder::new();
+    let all = folder.run(&["effects"]).ok();
+    assert!(
+        all.contains("quadratic_drag") && all.contains("tank_outflow"),
+        "{all}"
+    );
+    let one = folder.run(&["effects", "quadratic_drag"]).ok();
+    for part in [
+        "m*der(v) = ... + c*v*abs(v)",
+        "enters",
+        "function of",
+        "imitated by",
+        "cubic_drag:",
+    ] {
+        assert!(one.contains(part), "{one}");
+    }
+    let said = folder.run(&["effects", "quadratic_drg"]).error();
+    assert!(said.contains("did you mean quadratic_drag?"), "{said}");
 }

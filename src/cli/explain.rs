@@ -10,8 +10,11 @@ use super::plant::{is_plant_file, load, read_recordings, tell_warnings};
 use super::roles::{RoleFlags, tell_reading};
 use super::structure::HoldFlag;
 use super::{Outcome, Verbosity};
-use crate::explain::{Explanation, Options, Simulation, Verdict, explain, explain_plant};
+use crate::explain::{
+    Explanation, Hypothesis, Options, PlantOptions, Simulation, Verdict, explain, explain_plant,
+};
 use crate::log::{Channel, Log, LogError, Reading, RoleNeed, Roles, Source};
+use crate::physics::ModelSpec;
 use crate::report::text::explanation_text;
 use crate::report::{explanation_page, read_model, to_json};
 
@@ -19,12 +22,13 @@ const EXAMPLE: &str = "Examples:
   innovant explain recording.csv --simulation simulated.csv --output explanation.json
   innovant explain recording.csv --simulation model.json --report page.html
   innovant simulate explanation.json new_input.csv --output prediction.csv
+  innovant explain recording.csv --simulation plant.mo --hypothesis 'drag: m*der(v) += -c*v*abs(v), c > 0'
 
 The simulation is a CSV of its outputs on the recorded inputs (one file a recording, in the same order; compared by time,
 on a grid of its own if that is finer), one linear model as JSON ({\"A\":..,\"B\":..,\"C\":..,\"D\":..,\"dt\":..}, or what `innovant identify` writes), or
 a plant in equations (.mo), whose parameters may differ within their bounds.
 
-Effects (for --without):
+Effects (for --without; `innovant effects` describes them, and lists those of plants in equations):
   coulomb_friction stribeck_friction quadratic_drag cubic_stiffness quadratic_stiffness end_stop hysteresis
   position_dependent_gain input_saturation input_dead_zone input_backlash input_rate_limit input_asymmetry input_delay
   actuator_lag sensor_saturation sensor_offset sensor_drift sensor_rectification sensor_quantization sensor_freeze
@@ -57,6 +61,17 @@ pub(super) struct Flags {
     /// Leave effects out of the library, comma-separated ids
     #[arg(long, value_name = "IDS", value_delimiter = ',')]
     without: Vec<String>,
+    /// Try only these effects, comma-separated ids; for plants in equations
+    #[arg(long, value_name = "IDS", value_delimiter = ',')]
+    only: Vec<String>,
+    /// A term that may be missing in a plant in equations, or a file with one a line; may be repeated
+    ///
+    /// It is fitted beside the library and reported whether it wins or not. NAME: LEFT += EXPRESSION [, BOUND]...: LEFT is a
+    /// left-hand side of the plant (`m*der(v)`), a variable, an input or a parameter; `-=` takes a term away, `=` replaces
+    /// the right-hand side. New names in the expression are parameters; bounds are `c > 0`, `0 < c < 3`, a start value is
+    /// `c = 0.1`, a unit `c [N.s/m]`. `@FILE` is a file; `#` begins a comment in it.
+    #[arg(long, value_name = "TEXT")]
+    hypothesis: Vec<String>,
     /// Seed of the bootstrap
     #[arg(long, default_value = "0")]
     seed: u64,
@@ -85,6 +100,17 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     if flags.hold.is_some() {
         anyhow::bail!(
             "--hold belongs to a plant in equations (a .mo text), and the simulation is none"
+        );
+    }
+    if !flags.hypothesis.is_empty() {
+        anyhow::bail!(
+            "--hypothesis needs a plant in equations (a .mo text) as the simulation: a column of outputs or a linear model \
+             has no equation that a term could enter"
+        );
+    }
+    if !flags.only.is_empty() {
+        anyhow::bail!(
+            "--only belongs to a plant in equations (a .mo text), and the simulation is none; --without takes effects out"
         );
     }
     let roles = flags.roles.clone().roles();
@@ -117,9 +143,9 @@ fn of_plant(flags: &Flags, plant: &Path, say: Verbosity) -> anyhow::Result<Expla
             flags.simulation.len()
         );
     }
-    if !flags.without.is_empty() || !flags.map.is_empty() {
+    if !flags.map.is_empty() {
         anyhow::bail!(
-            "--without and --map are not available with a plant in equations yet; leave them out"
+            "--map is not available with a plant in equations: name the columns of the recording as the text does"
         );
     }
     let loaded = load(plant)?;
@@ -132,9 +158,44 @@ fn of_plant(flags: &Flags, plant: &Path, say: Verbosity) -> anyhow::Result<Expla
         RoleNeed::Identify,
         say,
     )?;
-    let hold = flags.hold.map_or(loaded.hold, Into::into);
-    explain_plant(&at_values, &logs, recordings, hold)
+    let options = PlantOptions {
+        hold: flags.hold.map_or(loaded.hold, Into::into),
+        only: flags.only.clone(),
+        without: flags.without.clone(),
+        hypotheses: hypotheses(&flags.hypothesis, &at_values.spec)?,
+    };
+    explain_plant(&at_values, &logs, recordings, &options)
         .map_err(|e| anyhow::anyhow!("{}: {e}", plant.display()))
+}
+
+/// Reads hypotheses, given as they are or in files.
+fn hypotheses(given: &[String], spec: &ModelSpec) -> anyhow::Result<Vec<Hypothesis>> {
+    let mut all = Vec::new();
+    for text in given {
+        let file = text.strip_prefix('@').map(Path::new);
+        let Some(file) = file.or_else(|| Some(Path::new(text)).filter(|p| p.is_file())) else {
+            let read = Hypothesis::parse(text, spec);
+            all.push(read.map_err(|e| anyhow::anyhow!(e.render("--hypothesis")))?);
+            continue;
+        };
+        let name = file.display();
+        let lines = std::fs::read_to_string(file)
+            .map_err(|e| anyhow::anyhow!("--hypothesis {name}: cannot be read: {e}"))?;
+        let before = all.len();
+        for (i, line) in lines.lines().enumerate() {
+            let line = line.split('#').next().unwrap_or("").trim_end();
+            if line.trim().is_empty() {
+                continue;
+            }
+            let read = Hypothesis::parse(line, spec);
+            let origin = format!("{name}, line {}", i + 1);
+            all.push(read.map_err(|e| anyhow::anyhow!(e.render(&origin)))?);
+        }
+        if all.len() == before {
+            anyhow::bail!("--hypothesis {name}: the file has no hypothesis; write one a line");
+        }
+    }
+    Ok(all)
 }
 
 /// Writes and prints the explanation.

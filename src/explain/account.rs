@@ -89,6 +89,7 @@ impl Answer<'_> {
                 definition
             };
             let mut effect_found = EffectFound {
+                hypothesis: false,
                 enters: None,
                 depends: vec![],
                 law: None,
@@ -200,6 +201,7 @@ impl Answer<'_> {
     fn exact(&self, id: &str, output: usize, numbers: &[(&str, f64, &str)]) -> Option<EffectFound> {
         let definition = effects::find(id, "")?;
         let mut found = EffectFound {
+            hypothesis: false,
             enters: None,
             depends: vec![],
             law: None,

@@ -112,6 +112,7 @@ impl Answer<'_> {
             .flatten();
         let mut explanation = Explanation {
             format: EXPLANATION_FORMAT.to_owned(),
+            hypotheses: vec![],
             verdict,
             probability: probability(finding, &fit),
             summary: Vec::new(),

@@ -21,6 +21,11 @@ fn is_one(steps: &usize) -> bool {
     *steps == 1
 }
 
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_false(value: &bool) -> bool {
+    !*value
+}
+
 /// Answers whose criteria differ by less explain the recording equally well (Kass and Raftery 1995: 6 is "strong").
 pub(crate) const EFFECTS_TIE: f64 = 6.0;
 
@@ -55,6 +60,9 @@ pub struct Explanation {
     pub effects: Vec<EffectFound>,
     /// What else was tried, best first.
     pub alternatives: Vec<Alternative>,
+    /// What was asked of a plant in equations, in the order of the questions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub hypotheses: Vec<HypothesisFound>,
     /// Where recording and simulation differ.
     #[serde(rename = "where")]
     pub location: Location,
@@ -96,6 +104,9 @@ pub struct Explanation {
 pub struct EffectFound {
     /// Id: `coulomb_friction`.
     pub effect: String,
+    /// True where it is a hypothesis of the user, whose name stands in the place of the id.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub hypothesis: bool,
     /// Which form of it, where there are several.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub variant: String,
@@ -186,6 +197,73 @@ pub struct Alternative {
     pub criterion_gain: f64,
     /// Why it lost.
     pub why_not: String,
+}
+
+/// What recordings say about a hypothesis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum HypothesisVerdict {
+    /// It is the answer, or a part of it.
+    Best,
+    /// It explains the recording, and something else does as well.
+    Supported,
+    /// Something else explains the recording better, or nothing is missing where it enters.
+    NotSupported,
+    /// Within its bounds it makes nothing better, or the plant with it cannot be simulated.
+    Refused,
+}
+
+/// A hypothesis of the user about a plant in equations.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct HypothesisFound {
+    /// Its name.
+    pub name: String,
+    /// As it was written.
+    pub text: String,
+    /// What the recordings say.
+    pub verdict: HypothesisVerdict,
+    /// Gain in Schwarz's criterion over the plant without it; absent where the plant with it cannot be simulated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain: Option<f64>,
+    /// Its gain beside the effects that are named.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain_beside: Option<f64>,
+    /// The gain that is needed.
+    pub gain_needed: f64,
+    /// The changed equation, in the language of the plant.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub equation: String,
+    /// Its new parameters.
+    pub parameters: BTreeMap<String, Quantity>,
+    /// What explains the recording as well or better, best first.
+    pub rivals: Vec<HypothesisRival>,
+    /// Free run without and with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fit: Option<HypothesisFit>,
+    /// In plain words.
+    pub sentence: String,
+}
+
+/// What explains a recording as well as a hypothesis, or better.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct HypothesisRival {
+    /// Id, or the name of another hypothesis.
+    pub effect: String,
+    /// Its gain in Schwarz's criterion.
+    pub gain: f64,
+    /// The changed equation.
+    pub equation: String,
+}
+
+/// Free run of the output that the answer shows most, on the samples that were fitted.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct HypothesisFit {
+    /// The output.
+    pub output: String,
+    /// With estimated parameters and initial states only.
+    pub parameters_only: FitFigure,
+    /// With the hypothesis, and what was named before it.
+    pub with_hypothesis: FitFigure,
 }
 
 /// Where recording and simulation differ.

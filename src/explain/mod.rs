@@ -77,13 +77,16 @@ mod words;
 
 pub use augmented::AugmentedError;
 pub use engine::documentation::{Imitation, PLANT_EFFECTS, PlantEffect, plant_effect};
+pub use engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
+pub use engine::scope::UnknownPlantEffect;
 pub use error::ExplainError;
 pub use explanation::{
     Alternative, AugmentedModel, AugmentedPlant, Curve, Detectable, EXPLANATION_FORMAT,
-    EffectFound, EffectSize, Evidence, Explanation, FitFigure, FitSteps, FitTable, Law, Location,
-    Mechanics, ModelEffect, NoiseFound, ParameterChange, Quantity, Regime, Remaining,
-    SignalReference, SignalTraces, StatePrior, Verdict,
+    EffectFound, EffectSize, Evidence, Explanation, FitFigure, FitSteps, FitTable, HypothesisFit,
+    HypothesisFound, HypothesisRival, HypothesisVerdict, Law, Location, Mechanics, ModelEffect,
+    NoiseFound, ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces,
+    StatePrior, Verdict,
 };
-pub use plant_answer::explain_plant;
+pub use plant_answer::{PlantOptions, PlantQuestionError, explain_plant};
 pub use question::{Options, explain};
 pub use simulation::Simulation;

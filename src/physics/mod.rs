@@ -27,6 +27,6 @@ pub use simulation::{
     SimulationError, Trajectory,
 };
 pub use spec::{Equation, ModelSpec, Unknown, Variable, VariableKind};
-pub(crate) use syntax::nearest;
+pub(crate) use syntax::{Token, function_names, is_reserved, nearest, tokens};
 pub use syntax::{diagnose, parse};
 pub use units::{Unit, UnknownUnit, check_units, unit_conflicts, unknown_units};

@@ -30,7 +30,7 @@ pub(crate) struct Candidate {
 }
 
 /// A name that the plant does not have.
-fn free_name(spec: &ModelSpec, wanted: &str) -> String {
+pub(super) fn free_name(spec: &ModelSpec, wanted: &str) -> String {
     let mut name = wanted.to_owned();
     let mut n = 1;
     while spec.find(&name).is_some() || spec.find(&format!("{name}_acting")).is_some() {
@@ -159,7 +159,7 @@ pub(crate) fn candidate(
 }
 
 /// The changed equation as it stands in the new text.
-fn equation_text(changed: &ModelSpec, spec: &ModelSpec, place: Place) -> String {
+pub(super) fn equation_text(changed: &ModelSpec, spec: &ModelSpec, place: Place) -> String {
     let variable = place.variable(spec);
     let name = match place {
         Place::Equation(_) => spec.variable(variable).name.clone(),

@@ -123,16 +123,11 @@ pub(super) fn curves(
         let values = normal.cholesky()?.solve(&right);
         let statistic = values.dot(&right);
         (statistic.is_finite() && m > 2).then(|| {
-            Lead::of_curve(
-                &CURVE,
-                place,
-                at,
-                Curve {
-                    knots,
-                    values: values.iter().copied().collect(),
-                },
-                statistic,
-            )
+            let mut lead = Lead::untested(&CURVE, place);
+            (lead.argument, lead.statistic) = (Some(at), statistic);
+            let values = values.iter().copied().collect();
+            lead.curve = Some(Curve { knots, values });
+            lead
         })
     });
     let mut found: Vec<Lead> = each.collect();

@@ -76,7 +76,7 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
 /// Bristles that yield within this part of the travel are dry friction.
 const YIELDS: f64 = 0.12;
 
-/// The id of a term at a place, as a function of variables. Each is described in
+/// The id of a term at a place, as a function of variables. Each but `hypothesis`, which has a name of its own, is described in
 /// [`documentation`](super::documentation).
 pub(crate) fn called(
     spec: &ModelSpec,
@@ -84,6 +84,9 @@ pub(crate) fn called(
     place: Place,
     variables: &[VariableId],
 ) -> &'static str {
+    if term.id == "hypothesis" {
+        return term.id;
+    }
     let what = kind(spec, variables);
     let own = place.variable(spec);
     let unit = |v: VariableId| spec.variable(v).unit_text.as_deref().unwrap_or("");

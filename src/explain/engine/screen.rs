@@ -44,23 +44,17 @@ pub(crate) struct Lead {
 }
 
 impl Lead {
-    /// A curve, with its values.
-    pub(super) fn of_curve(
-        term: &'static Term,
-        place: Place,
-        argument: usize,
-        curve: Curve,
-        statistic: f64,
-    ) -> Self {
+    /// A term at a place that no test has looked at.
+    pub(super) fn untested(term: &'static Term, place: Place) -> Self {
         Self {
             term,
             place,
             sensor: false,
-            argument: Some(argument),
+            argument: None,
             shapes: vec![],
-            strength: 1.0,
-            statistic,
-            curve: Some(curve),
+            strength: 0.0,
+            statistic: 0.0,
+            curve: None,
             signature: [0.0; SIGNATURE],
         }
     }

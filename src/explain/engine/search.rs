@@ -3,8 +3,10 @@
 use rayon::prelude::*;
 
 use super::candidate::{Candidate, candidate};
+use super::hypothesis::{Ground, Trial, prefer_asked, trials};
 use super::library::Starts;
 use super::names::{SPECIFIC, named, rank, rank_of};
+use super::scope::Scope;
 use super::screen::{Lead, Screen, screen};
 use crate::physics::estimate::{
     Effort, EstimateError, EstimateOptions, Fit, PlantRecording, Study,
@@ -18,7 +20,7 @@ const OF_A_KIND: usize = 3;
 const AT_A_PLACE: usize = 8;
 /// The best lead of each term is fitted too where its statistic is at least this part of the best.
 const IMITATED: f64 = 0.3;
-const GLANCE: Effort = Effort {
+pub(super) const GLANCE: Effort = Effort {
     iterations: 4,
     settled: 0.3,
 };
@@ -27,17 +29,20 @@ const GLANCED_ACCURACY: f64 = 1e-6;
 /// The best of these are fitted with a noise model of their own, and the best of them until nothing changes.
 const FITTED: usize = 8;
 const FINISHED: usize = 8;
-const THOROUGH: Effort = Effort {
+pub(super) const THOROUGH: Effort = Effort {
     iterations: 20,
     settled: 0.05,
 };
-const ROUNDS: usize = 2;
+pub(super) const ROUNDS: usize = 2;
 /// Gain in Schwarz's criterion that is needed, beyond the penalty for what was searched: odds of e^8 (math/physics.md).
 pub(crate) const NEEDED: f64 = 16.0;
+/// A name is given where the gain is at least this; between [`NEEDED`] and this the place is given, and the best term as a
+/// rival (math/physics.md, "Fits and decision").
+pub(crate) const SURE: f64 = 24.0;
 /// A second effect must gain more, and at least this part of the first.
-const SECOND: (f64, f64) = (30.0, 0.12);
+pub(super) const SECOND: (f64, f64) = (30.0, 0.12);
 /// Gains that differ by less, or by this part of the best, are equal.
-const TIE: (f64, f64) = (6.0, 0.08);
+pub(crate) const TIE: (f64, f64) = (6.0, 0.08);
 /// Most effects that are named.
 const MOST: usize = 2;
 
@@ -58,6 +63,8 @@ pub(crate) struct Fitted {
     pub fit: Fit,
     /// Gain in the criterion over the plant without it, less the penalty of the search.
     pub gain: f64,
+    /// Place in the user's hypotheses; none for a term of the library.
+    pub hypothesis: Option<usize>,
 }
 
 /// What the search has found.
@@ -71,6 +78,8 @@ pub(crate) struct Found {
     pub plant: Plant,
     pub fit: Fit,
     pub accepted: usize,
+    /// What the recordings say about each hypothesis.
+    pub trials: Vec<Trial>,
     pub options: EstimateOptions,
 }
 
@@ -127,6 +136,8 @@ fn step(
     own: usize,
     recordings: &[PlantRecording],
     options: &EstimateOptions,
+    scope: &Scope,
+    open: &[usize],
 ) -> (Vec<Fitted>, (f64, usize)) {
     let states = plant.spec.states().len();
     let parameters = study.parameters();
@@ -143,6 +154,9 @@ fn step(
         && let Some(s) = screen(study, &white, own, recordings)
     {
         tried.push((s, white));
+    }
+    for (screen, _) in &mut tried {
+        scope.restrict(&plant.spec, screen);
     }
     let mut glanced: Vec<(f64, Lead, usize, Candidate, Fit)> = tried
         .iter()
@@ -223,15 +237,29 @@ fn step(
                 candidate: made,
                 fit: best,
                 gain,
+                hypothesis: None,
             })
         })
         .collect();
     let mut fitted = finished(fitted, fit, recordings, options);
+    let mut origins = vec![fit];
+    origins.extend(tried.iter().skip(1).map(|(_, white)| white));
+    let ground = Ground {
+        plant,
+        study,
+        fit,
+        origins,
+        recordings,
+        options,
+    };
+    fitted.extend(trials(&scope.hypotheses, open, &ground));
+    fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     // Among those that explain the recording as well as the best, the one with a name of its own comes first.
     if let Some(best) = fitted.first().map(|f| f.gain) {
         let tie = TIE.0.max(TIE.1 * best);
         let ties = fitted.iter().take_while(|f| best - f.gain <= tie).count();
         fitted[..ties].sort_by_key(|f| rank(&plant.spec, f));
+        prefer_asked(&mut fitted);
     }
     (fitted, strongest)
 }
@@ -266,7 +294,7 @@ fn finished(
     fitted
 }
 
-fn with_more(options: &EstimateOptions, count: usize) -> EstimateOptions {
+pub(crate) fn with_more(options: &EstimateOptions, count: usize) -> EstimateOptions {
     let mut options = options.clone();
     options.free.extend(std::iter::repeat_n(true, count));
     options
@@ -280,6 +308,7 @@ pub(crate) fn search(
     plant: &Plant,
     recordings: &[PlantRecording],
     hold: Hold,
+    scope: &Scope,
 ) -> Result<Found, EstimateError> {
     let mut options = EstimateOptions {
         free: vec![true; plant.spec.parameters().len()],
@@ -295,9 +324,20 @@ pub(crate) fn search(
     let mut left = (0.0, 0);
     let own = plant.spec.parameters().len();
     let mut accepted_so_far = 0;
+    let mut asked = vec![Trial::default(); scope.hypotheses.len()];
     for count in 0..=MOST {
         let study = Study::new(&now, recordings, &options)?;
-        let (fitted, strongest) = step(&now, &study, &fit, own, recordings, &options);
+        let open: Vec<usize> = (0..asked.len())
+            .filter(|&i| asked[i].accepted.is_none())
+            .collect();
+        let (fitted, strongest) = step(&now, &study, &fit, own, recordings, &options, scope, &open);
+        for &i in &open {
+            let trial = fitted.iter().find(|f| f.hypothesis == Some(i));
+            match count {
+                0 => asked[i].alone = trial.cloned(),
+                _ => asked[i].beside = trial.map(|f| f.gain),
+            }
+        }
         left = strongest;
         let needed = match steps.first().and_then(|s| s.first()) {
             None => NEEDED,
@@ -309,7 +349,8 @@ pub(crate) fn search(
         let new = |f: &&Fitted| {
             first.is_none_or(|first| {
                 let id = named(&now.spec, f);
-                !matches!(id, "law" | "cross_coupling") && id != named(&plant.spec, first)
+                f.hypothesis.is_some()
+                    || !matches!(id, "law" | "cross_coupling") && id != named(&plant.spec, first)
             })
         };
         let best = fitted.first().filter(new);
@@ -323,6 +364,9 @@ pub(crate) fn search(
         options = with_more(&options, best.candidate.values.len());
         now = best.candidate.plant.clone();
         fit = best.fit.clone();
+        if let Some(i) = best.hypothesis {
+            asked[i].accepted = Some(count);
+        }
         steps.push(fitted);
         accepted_so_far += 1;
     }
@@ -333,6 +377,7 @@ pub(crate) fn search(
         plant: now,
         fit,
         accepted: accepted_so_far,
+        trials: asked,
         options,
     })
 }

@@ -6,7 +6,6 @@ use super::Answer;
 use crate::explain::engine::curve::piece;
 use crate::explain::engine::edit::{Place, user_of};
 use crate::explain::engine::library::Port;
-use crate::explain::engine::names::named;
 use crate::explain::engine::search::{Fitted, NEEDED};
 use crate::explain::engine::values::filled;
 use crate::explain::explanation::{Alternative, EffectFound, Evidence, Law, Quantity, Verdict};
@@ -20,7 +19,7 @@ const DIFFERENCE: f64 = 1e-4;
 impl Answer<'_> {
     pub(super) fn effect(&self, step: usize, fitted: &Fitted) -> Option<EffectFound> {
         let before = self.spec_before(step);
-        let id = named(before, fitted);
+        let id = self.called(before, fitted);
         let at = fitted.lead.place.variable(before);
         // A parameter acts through the equation that uses it.
         let entered = match fitted.lead.place {
@@ -72,7 +71,8 @@ impl Answer<'_> {
             names => format!(" as a function of {}", names.join(" and ")),
         };
         Some(EffectFound {
-            effect: id.to_owned(),
+            hypothesis: fitted.hypothesis.is_some(),
+            effect: id.clone(),
             variant: fitted.lead.term.id.to_owned(),
             signal: enters.clone(),
             port: match fitted.lead.term.port {
@@ -94,7 +94,10 @@ impl Answer<'_> {
             },
             sentence: format!(
                 "{} enters {place}{of}: {}",
-                spoken(id),
+                match fitted.hypothesis {
+                    Some(_) => format!("The hypothesis {id}"),
+                    None => spoken(&id),
+                },
                 fitted.candidate.equation
             ),
         })
@@ -123,14 +126,14 @@ impl Answer<'_> {
         let at: Vec<f64> = (0..LAW_POINTS)
             .map(|i| low + (high - low) * i as f64 / (LAW_POINTS - 1) as f64)
             .collect();
-        let value = curve_of(fitted, &values, &at)?;
+        let value = self.curve_of(fitted, &values, &at)?;
         let covariance = self.whole.covariance(&self.found.fit);
         let mut slopes = Vec::new();
         for (i, &p) in at_point.iter().enumerate() {
             let step = DIFFERENCE * (values[i].abs() + covariance[(p, p)].max(0.0).sqrt());
             let mut moved = values.clone();
             moved[i] += step;
-            let there = curve_of(fitted, &moved, &at)?;
+            let there = self.curve_of(fitted, &moved, &at)?;
             slopes.push(
                 there
                     .iter()
@@ -156,26 +159,74 @@ impl Answer<'_> {
         })
     }
 
+    /// What a term adds where its argument has these values, with these values of its numbers.
+    fn curve_of(&self, fitted: &Fitted, values: &[f64], at: &[f64]) -> Option<Vec<f64>> {
+        if let Some(curve) = &fitted.lead.curve {
+            let pieces = |z: f64| -> f64 {
+                let each = values.iter().enumerate();
+                each.map(|(i, v)| v * piece(&curve.knots, i, z)).sum()
+            };
+            return Some(at.iter().map(|&z| pieces(z)).collect());
+        }
+        let term = fitted.lead.term;
+        let text = match fitted.hypothesis.and_then(|i| self.hypotheses.get(i)) {
+            Some(hypothesis) => hypothesis.as_law("z", |word| {
+                let own = hypothesis.numbers().iter().position(|n| n.name == word);
+                let value = match own {
+                    Some(i) => values[i],
+                    None => {
+                        let spec = &self.found.plant.spec;
+                        let parameters = spec.parameters();
+                        let at = parameters
+                            .iter()
+                            .position(|&v| spec.variable(v).name == word)?;
+                        self.found.fit.point[at]
+                    }
+                };
+                Some(format!("({value:e})"))
+            })?,
+            None => {
+                let shapes: Vec<String> = values.iter().map(|v| format!("({v:e})")).collect();
+                let strength = shapes.last()?;
+                let argument = fitted.argument.replace(&fitted.depends[0], "z");
+                let form = filled(term.form, term, &argument, &[], &shapes, 1.0);
+                format!("{strength}*({form})")
+            }
+        };
+        let text = format!("model Law input Real z; output Real y; equation y = {text}; end Law;");
+        let inputs = [at];
+        let excitation = Excitation {
+            inputs: &inputs,
+            length: at.len(),
+            sample_time: 1.0,
+            start_time: 0.0,
+            hold: Hold::Zero,
+        };
+        let plant = Plant::new(parse(&text).ok()?);
+        let run = plant.simulate(&plant.nominal(), &excitation, None).ok()?;
+        run.outputs.into_iter().next()
+    }
+
     pub(super) fn alternatives(&self, verdict: Verdict) -> Vec<Alternative> {
         let Some(first) = self.found.steps.first() else {
             return vec![];
         };
         let best = first.first().map_or(1.0, |f| f.gain).max(1e-9);
         let skip = usize::from(verdict == Verdict::Named);
-        let mut seen: Vec<&str> = first
+        let mut seen: Vec<String> = first
             .iter()
             .take(skip)
-            .map(|f| named(&self.plant.spec, f))
+            .map(|f| self.called(&self.plant.spec, f))
             .collect();
         let mut all = Vec::new();
         for fitted in first.iter().skip(skip) {
-            let id = named(&self.plant.spec, fitted);
+            let id = self.called(&self.plant.spec, fitted);
             if seen.contains(&id) || fitted.gain <= 0.0 {
                 continue;
             }
-            seen.push(id);
+            seen.push(id.clone());
             all.push(Alternative {
-                effect: id.to_owned(),
+                effect: id,
                 support: (fitted.gain / best).clamp(0.0, 1.0),
                 criterion_gain: fitted.gain,
                 why_not: format!(
@@ -186,42 +237,6 @@ impl Answer<'_> {
         }
         all
     }
-}
-
-/// What a term adds where its argument has these values.
-fn curve_of(fitted: &Fitted, values: &[f64], at: &[f64]) -> Option<Vec<f64>> {
-    if let Some(curve) = &fitted.lead.curve {
-        let pieces = |z: f64| -> f64 {
-            let each = values.iter().enumerate();
-            each.map(|(i, v)| v * piece(&curve.knots, i, z)).sum()
-        };
-        return Some(at.iter().map(|&z| pieces(z)).collect());
-    }
-    let term = fitted.lead.term;
-    let shapes: Vec<String> = values.iter().map(|v| format!("({v:e})")).collect();
-    let strength = shapes.last()?;
-    let text = filled(
-        term.form,
-        term,
-        &fitted.argument.replace(&fitted.depends[0], "z"),
-        &[],
-        &shapes,
-        1.0,
-    );
-    let text = format!(
-        "model Law input Real z; output Real y; equation y = {strength}*({text}); end Law;"
-    );
-    let inputs = [at];
-    let excitation = Excitation {
-        inputs: &inputs,
-        length: at.len(),
-        sample_time: 1.0,
-        start_time: 0.0,
-        hold: Hold::Zero,
-    };
-    let plant = Plant::new(parse(&text).ok()?);
-    let run = plant.simulate(&plant.nominal(), &excitation, None).ok()?;
-    run.outputs.into_iter().next()
 }
 
 /// The id in words, as a sentence begins with it.

@@ -1,12 +1,18 @@
 //! The answer where the simulation is a plant in equations.
 
 mod effects;
+mod hypotheses;
+mod question;
+
+pub use question::{PlantOptions, PlantQuestionError};
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::answer::extremes;
+use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
 use super::engine::library::Port;
-use super::engine::search::{Fitted, Found, search};
+use super::engine::scope::Scope;
+use super::engine::search::{Fitted, Found, SURE, search};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
     FitTable, Location, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
@@ -16,12 +22,9 @@ use super::words::{number, quantity};
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
 use crate::noise::Series;
-use crate::physics::estimate::{EstimateError, EstimateOptions, Fit, PlantRecording, Study};
-use crate::physics::{Excitation, Hold, ModelSpec, Plant};
+use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
+use crate::physics::{Excitation, Hold, ModelSpec, Plant, Span};
 
-/// A name is given where the gain is at least this; between [`NEEDED`] and this the place is given, and the best term as a
-/// rival (math/physics.md, "Fits and decision").
-const SURE: f64 = 24.0;
 /// A parameter is said to differ from the text where it does by so many standard deviations.
 const DIFFERENT: f64 = 3.3;
 /// Tests whose probability, all of them considered, is below this are more than noise.
@@ -32,13 +35,18 @@ const TRACE_POINTS: usize = 1500;
 /// Says what a plant in equations leaves out of recordings.
 ///
 /// # Errors
-/// Those of an estimation of its parameters.
+/// Ids of effects that do not exist, and those of an estimation of its parameters.
 pub fn explain_plant(
     plant: &Plant,
     logs: &[Log],
     known: Vec<Recording>,
-    hold: Hold,
-) -> Result<Explanation, EstimateError> {
+    options: &PlantOptions,
+) -> Result<Explanation, PlantQuestionError> {
+    let scope = Scope {
+        hypotheses: distinct(&options.hypotheses)?,
+        ..Scope::new(&options.only, &options.without)?
+    };
+    let hold = options.hold;
     let recordings: Vec<PlantRecording> = logs
         .iter()
         .map(|log| PlantRecording {
@@ -48,7 +56,7 @@ pub fn explain_plant(
             start_time: log.start_time,
         })
         .collect();
-    let found = search(plant, &recordings, hold)?;
+    let found = search(plant, &recordings, hold, &scope)?;
     let base_options = EstimateOptions {
         free: vec![true; plant.spec.parameters().len()],
         ..found.options.clone()
@@ -60,6 +68,7 @@ pub fn explain_plant(
         whole: Study::new(&found.plant, &recordings, &found.options)?,
         hold,
         found: &found,
+        hypotheses: &scope.hypotheses,
         channels: logs
             .first()
             .map_or_else(Vec::new, |log| log.outputs.clone()),
@@ -74,7 +83,24 @@ struct Answer<'a> {
     whole: Study<'a>,
     hold: Hold,
     found: &'a Found,
+    hypotheses: &'a [Hypothesis],
     channels: Vec<Channel>,
+}
+
+/// Hypotheses are told apart by their names.
+fn distinct(all: &[Hypothesis]) -> Result<Vec<Hypothesis>, HypothesisError> {
+    for (i, hypothesis) in all.iter().enumerate() {
+        let name = hypothesis.name();
+        if all[..i].iter().any(|h| h.name() == name) {
+            let span = Span {
+                start: 0,
+                end: name.len(),
+            };
+            let kind = HypothesisErrorKind::SameName(name.to_owned());
+            return Err(HypothesisError::new(hypothesis.text(), span, kind));
+        }
+    }
+    Ok(all.to_vec())
 }
 
 /// The mean of the values that are there, at every sample.
@@ -209,6 +235,7 @@ impl Answer<'_> {
             probability: probability(verdict),
             summary,
             alternatives: self.alternatives(verdict),
+            hypotheses: self.hypotheses(&recorded, &only, shows),
             location: Location {
                 outputs: if verdict == Verdict::Consistent {
                     vec![]

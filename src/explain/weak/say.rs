@@ -159,6 +159,7 @@ impl Answer<'_> {
                 );
             }
             let mut effect = EffectFound {
+                hypothesis: false,
                 enters: None,
                 depends: vec![],
                 law: None,

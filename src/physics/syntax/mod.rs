@@ -43,7 +43,8 @@ mod parser;
 mod tests;
 mod tokens;
 
-pub(crate) use names::{constant, nearest};
+pub(crate) use names::{constant, function_names, is_reserved, nearest};
+pub(crate) use tokens::{Token, tokens};
 
 use super::error::{MOST_ERRORS, SpecError, SpecErrorKind, shortened};
 use super::expression::{Binary, Node, Span};
@@ -51,7 +52,6 @@ use super::spec::ModelSpec;
 use declarations::{Declared, annotation, comment, construct, declaration, description};
 use draft::{Draft, DraftEquation};
 use parser::{FLATTEN, Parser};
-use tokens::Token;
 
 /// Bytes of a text that are read.
 const LONGEST: usize = 10_000_000;

@@ -75,7 +75,7 @@ const RESERVED: [&str; 64] = [
 ];
 
 /// True for a word that cannot name a variable.
-pub(super) fn is_reserved(word: &str) -> bool {
+pub(crate) fn is_reserved(word: &str) -> bool {
     RESERVED.contains(&word)
 }
 
@@ -119,6 +119,11 @@ pub(super) fn function(name: &str, imports: &Imports) -> Option<Callee> {
         let short = meaning.strip_prefix("Modelica.Math.").unwrap_or(&meaning);
         FUNCTIONS.iter().find(|f| f.0 == short).map(|f| f.1)
     })
+}
+
+/// Names of all functions.
+pub(crate) fn function_names() -> impl Iterator<Item = &'static str> {
+    FUNCTIONS.iter().map(|f| f.0)
 }
 
 /// The name of a function that is nearest to this one.

@@ -5,7 +5,7 @@ use crate::physics::expression::Span;
 
 /// Kind of a token; what it says is the text of its span.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Token {
+pub(crate) enum Token {
     /// A name, dotted or quoted, or a word of the language.
     Name,
     /// A number.
@@ -34,6 +34,18 @@ const LOOKALIKES: [(&str, &str); 7] = [
     ("\u{2264}", "`<=`"),
     ("\u{2265}", "`>=`"),
 ];
+
+/// The tokens of a text that is no whole model, without its end.
+pub(crate) fn tokens(text: &str) -> Result<Vec<(Token, Span)>, SpecError> {
+    let mut lexer = Lexer::new(text);
+    let mut all = Vec::new();
+    loop {
+        match lexer.next()? {
+            (Token::End, _) => return Ok(all),
+            found => all.push(found),
+        }
+    }
+}
 
 /// Reads token after token.
 pub(super) struct Lexer<'a> {

@@ -136,7 +136,7 @@ mod tests {
             assert!(all.contains(&format!("  {id} ")), "{id}");
             let one = effects_text(Some(id)).unwrap();
             assert!(one.starts_with(&format!("{id}: ")), "{one}");
-            assert!(one.contains("equation"), "{one}");
+            assert!(one.lines().count() > 2, "{one}");
         }
     }
 

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::wrapped;
-use crate::explain::{Explanation, Verdict};
+use crate::explain::{Explanation, HypothesisVerdict, Verdict};
 
 /// Verdict and summary.
 pub fn explanation_text(explanation: &Explanation) -> String {
@@ -30,6 +30,16 @@ pub fn explanation_text(explanation: &Explanation) -> String {
         if !text.ends_with('\n') {
             text.push('\n');
         }
+    }
+    for h in &explanation.hypotheses {
+        let word = match h.verdict {
+            HypothesisVerdict::Best => "BEST",
+            HypothesisVerdict::Supported => "SUPPORTED",
+            HypothesisVerdict::NotSupported => "NOT SUPPORTED",
+            HypothesisVerdict::Refused => "REFUSED",
+        };
+        let line = format!("Hypothesis {}: {word}. {}", h.name, h.sentence);
+        text.push_str(&wrapped("  ", &line));
     }
     text
 }

@@ -7,7 +7,6 @@ use crate::explain::engine::argument::arguments;
 use crate::explain::engine::edit::{Place, places, sensors};
 use crate::explain::engine::library::{Needs, Port, TERMS};
 use crate::explain::engine::names::called;
-use crate::explain::engine::screen::Lead;
 use crate::physics::parse;
 
 /// Plants that between them have every kind of place and argument that a name depends on.
@@ -38,33 +37,21 @@ fn names() -> BTreeSet<&'static str> {
         let sensors = sensors(&spec);
         let arguments = arguments(&spec);
         for term in TERMS {
-            let mut at: Vec<(Place, bool)> = match term.port {
-                Port::Sensor => sensors
-                    .iter()
-                    .map(|&s| (Place::Equation(s), true))
-                    .collect(),
-                _ => places(&spec).into_iter().map(|p| (p, false)).collect(),
+            let mut at: Vec<Place> = match term.port {
+                Port::Sensor => sensors.iter().map(|&s| Place::Equation(s)).collect(),
+                _ => places(&spec, usize::MAX),
             };
-            at.retain(|(place, _)| match term.port {
+            at.retain(|place| match term.port {
                 Port::Equation | Port::Sensor => matches!(place, Place::Equation(_)),
                 Port::Input => matches!(place, Place::Input(_)),
                 Port::Parameter => matches!(place, Place::Parameter(_)),
             });
-            for (place, sensor) in at {
-                let lead = |argument| Lead {
-                    term,
-                    place,
-                    sensor,
-                    argument,
-                    shapes: vec![],
-                    strength: 0.0,
-                    statistic: 0.0,
-                };
+            for place in at {
                 if term.needs == Needs::Time {
-                    all.insert(called(&spec, &lead(None), &[]));
+                    all.insert(called(&spec, term, place, &[]));
                     continue;
                 }
-                for (i, argument) in arguments.iter().enumerate() {
+                for argument in &arguments {
                     // What an argument must be, as far as that does not depend on a recording.
                     let serves = match term.needs {
                         Needs::Temperature => argument.temperature,
@@ -73,7 +60,7 @@ fn names() -> BTreeSet<&'static str> {
                         _ => true,
                     };
                     if serves {
-                        all.insert(called(&spec, &lead(Some(i)), &argument.variables));
+                        all.insert(called(&spec, term, place, &argument.variables));
                     }
                 }
             }

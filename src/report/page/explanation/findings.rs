@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::number::{fixed, number, p_value, percent, typeset, uncertain, width, with_unit};
 use super::plot::interval;
 use super::words::{capitalised, effect_name, listed, port};
-use crate::explain::{EffectFound, Evidence, Explanation, Verdict};
+use crate::explain::{EffectFound, Evidence, Explanation, HypothesisVerdict, Verdict};
 
 /// An effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -31,6 +31,16 @@ pub(super) struct Rival {
     answer: bool,
 }
 
+/// A hypothesis of the user.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Asked {
+    name: String,
+    text: String,
+    verdict: &'static str,
+    gain: String,
+    sentence: String,
+}
+
 /// Where recording and simulation differ.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Where {
@@ -43,6 +53,25 @@ pub(super) struct Where {
 /// The effects, most important first.
 pub(super) fn findings(of: &Explanation) -> Vec<Finding> {
     of.effects.iter().map(finding).collect()
+}
+
+/// What was asked, in the order of the questions.
+pub(super) fn asked(of: &Explanation) -> Vec<Asked> {
+    of.hypotheses
+        .iter()
+        .map(|h| Asked {
+            name: h.name.clone(),
+            text: h.text.clone(),
+            verdict: match h.verdict {
+                HypothesisVerdict::Best => "Best",
+                HypothesisVerdict::Supported => "Supported",
+                HypothesisVerdict::NotSupported => "Not supported",
+                HypothesisVerdict::Refused => "Refused",
+            },
+            gain: h.gain.map_or("–".to_owned(), |g| number(g, 3)),
+            sentence: typeset(&h.sentence),
+        })
+        .collect()
 }
 
 fn finding(of: &EffectFound) -> Finding {

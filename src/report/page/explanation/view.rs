@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::closing::{Left, Provenance, changes, detectable, left, noise, provenance};
-use super::findings::{Finding, Rival, Where, findings, location, rivals};
+use super::findings::{Asked, Finding, Rival, Where, asked, findings, location, rivals};
 use super::head::{Head, sections};
 use super::maps::{frequency_maps, learned_curve};
 use super::number::{probability, typeset, width};
@@ -27,6 +27,7 @@ pub(super) struct View {
     signals: Vec<Group>,
     maps: Vec<Group>,
     findings: Vec<Finding>,
+    asked: Vec<Asked>,
     location: Option<Where>,
     proof: Proof,
     rivals: Vec<Rival>,
@@ -56,6 +57,7 @@ pub(super) fn view(of: &Explanation) -> View {
             sections: sections(&[
                 ("pictures", "Pictures", !signals.is_empty()),
                 ("found", "Effect", !findings.is_empty()),
+                ("asked", "Hypotheses", !of.hypotheses.is_empty()),
                 ("where", "Where", location.is_some()),
                 ("proof", "Proof", true),
                 ("rivals", "Rivals", !rivals.is_empty()),
@@ -74,6 +76,7 @@ pub(super) fn view(of: &Explanation) -> View {
         signals,
         maps,
         findings,
+        asked: asked(of),
         location,
         proof: proof(of),
         rivals,
