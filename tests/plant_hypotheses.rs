@@ -153,7 +153,7 @@ fn bad_hypotheses_are_told_where_and_how() {
         (
             "@mine.txt",
             &[
-                "mine.txt, line 2, column 23: `foo` is no function",
+                "mine.txt, line 2, column 22: `foo` is no function",
                 "tanh",
                 "^^^",
             ][..],

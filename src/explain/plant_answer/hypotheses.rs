@@ -83,22 +83,23 @@ impl Answer<'_> {
         );
         let study = Study::new(&own.candidate.plant, self.recordings, &options).ok();
         let covariance = study.as_ref().map(|s| s.covariance(&own.fit));
+        let at_bounds: Vec<String> = hypothesis
+            .at_bounds(values)
+            .iter()
+            .map(|n| n.name.clone())
+            .collect();
         for (i, (name, &value)) in names.iter().zip(values).enumerate() {
             let std = covariance
                 .as_ref()
                 .map(|c| c[(first + i, first + i)].max(0.0).sqrt());
             let unit = hypothesis.numbers()[i].unit.clone().unwrap_or_default();
             // At a bound the curvature says nothing about how certain the number is.
-            let std = std.filter(|s| s.is_finite() && *s > 0.0);
+            let inside = !at_bounds.contains(&hypothesis.numbers()[i].name);
+            let std = std.filter(|s| inside && s.is_finite() && *s > 0.0);
             found
                 .parameters
                 .insert(name.clone(), Quantity { value, std, unit });
         }
-        let at_bounds: Vec<String> = hypothesis
-            .at_bounds(values)
-            .iter()
-            .map(|n| n.name.clone())
-            .collect();
         found.gain = Some(own.gain);
         found.equation = own.candidate.equation.clone();
         found.rivals = self.rivals(step, tried, own);
