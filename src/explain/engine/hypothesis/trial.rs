@@ -230,7 +230,7 @@ impl Hypothesis {
             let quantile = |part: f64| sorted[(part * last as f64).round() as usize];
             let size = quantile(0.0).abs().max(quantile(1.0).abs());
             let spread = 0.5 * (quantile(0.84) - quantile(0.16));
-            if !(spread > 0.0) {
+            if spread <= 0.0 || !spread.is_finite() {
                 continue;
             }
             scales.extend([0.02, 0.2, 1.0].map(|f| f * spread));
