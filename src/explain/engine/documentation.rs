@@ -84,6 +84,17 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
         ],
     ),
     effect(
+        "hysteresis",
+        "memory of the direction",
+        "m*der(v) = ... + c*z, der(z) = (v - abs(v)*z)/s",
+        ANY_EQUATION,
+        "the rate of what is remembered: a speed, a current",
+        &[like(
+            "coulomb_friction",
+            "Move to and fro by less than the friction's usual travel: hysteresis springs back.",
+        )],
+    ),
+    effect(
         "stribeck_friction",
         "friction that falls with speed",
         "m*der(v) = ... + c*tanh(v/w)*exp(-abs(v)/vs)",
@@ -437,6 +448,17 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
         &[like(
             "input_dead_zone",
             "Apply small inputs around several levels: play acts at every level where the direction changes.",
+        )],
+    ),
+    effect(
+        "valve_stiction",
+        "valve that sticks and slips",
+        "u becomes m, which stays until u is S away and then moves to it",
+        AN_INPUT,
+        ITSELF,
+        &[like(
+            "input_backlash",
+            "Move the input slowly one way: play follows at a distance, a valve that sticks moves in jumps.",
         )],
     ),
     effect(
