@@ -4,6 +4,17 @@ use crate::physics::{ModelSpec, VariableId, VariableKind};
 
 use super::library::Needs;
 
+/// How an argument is made of variables.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ArgumentForm {
+    Variable,
+    /// A difference of two variables of one unit.
+    Difference,
+    Product,
+    /// The difference of the fourth powers of two absolute temperatures in 100 K.
+    Radiation,
+}
+
 /// An expression of the plant's variables.
 #[derive(Debug, Clone)]
 pub(crate) struct Argument {
@@ -11,11 +22,7 @@ pub(crate) struct Argument {
     pub variables: Vec<VariableId>,
     /// Place of the equation behind which all of it is known; none where states and inputs are enough.
     pub known_after: Option<usize>,
-    pub temperature: bool,
-    pub difference: bool,
-    pub product: bool,
-    /// A temperature in kelvins of a plant that has it in degrees.
-    pub absolute: bool,
+    pub form: ArgumentForm,
     pub angle: bool,
     /// Changes at samples only: it is made of inputs.
     pub held: bool,
@@ -24,6 +31,8 @@ pub(crate) struct Argument {
     sorted: Vec<f64>,
 }
 
+/// Temperature of a room, 20 degC, as in [`ArgumentForm::Radiation`].
+const ROOM: &str = "2.9315^4";
 /// Samples that quantiles are taken of.
 const SORTED: usize = 4000;
 
@@ -43,11 +52,8 @@ impl Argument {
             .iter()
             .all(|&v| spec.variable(v).kind == VariableKind::Input);
         Self {
-            temperature: variables.len() == 1 && unit(variables[0]) == "K",
+            form: ArgumentForm::Variable,
             angle: variables.len() == 1 && unit(variables[0]) == "rad",
-            difference: false,
-            product: false,
-            absolute: false,
             held,
             expression,
             variables,
@@ -107,7 +113,9 @@ impl Argument {
 
     /// Whether a term can be a function of it.
     pub fn serves(&self, needs: Needs) -> bool {
-        if self.product || self.absolute && needs != Needs::Temperature {
+        if self.form == ArgumentForm::Product
+            || self.form == ArgumentForm::Radiation && needs != Needs::Radiation
+        {
             return false;
         }
         let both = self.quantile(0.05) < 0.0 && self.quantile(0.95) > 0.0;
@@ -115,8 +123,8 @@ impl Argument {
             Needs::Anything => true,
             Needs::BothSigns => both,
             Needs::Positive => self.quantile(0.0) >= 0.0,
-            Needs::Temperature => self.temperature,
-            Needs::Difference => self.difference,
+            Needs::Radiation => self.form == ArgumentForm::Radiation,
+            Needs::Difference => self.form == ArgumentForm::Difference,
             Needs::Angle => self.angle && self.range() > std::f64::consts::PI,
             Needs::Time => false,
         }
@@ -151,13 +159,6 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
         .iter()
         .map(|&v| Argument::new(spec, name(v), vec![v]))
         .collect();
-    for &v in &simple {
-        if spec.variable(v).unit_text.as_deref() == Some("degC") {
-            let mut kelvins = Argument::new(spec, format!("({} + 273.15)", name(v)), vec![v]);
-            (kelvins.temperature, kelvins.absolute) = (true, true);
-            found.push(kelvins);
-        }
-    }
     let source = |v: VariableId| spec.variable(v).kind != VariableKind::Algebraic;
     for (i, &a) in simple.iter().enumerate() {
         for &b in &simple[i + 1..] {
@@ -165,16 +166,41 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
             if unit(a).is_some() && unit(a) == unit(b) && source(a) && source(b) {
                 let text = format!("({} - {})", name(a), name(b));
                 let mut difference = Argument::new(spec, text, vec![a, b]);
-                difference.difference = true;
+                difference.form = ArgumentForm::Difference;
                 found.push(difference);
             }
             if source(a) && source(b) {
                 let text = format!("{}*{}", name(a), name(b));
                 let mut product = Argument::new(spec, text, vec![a, b]);
-                product.product = true;
+                product.form = ArgumentForm::Product;
                 found.push(product);
             }
         }
     }
+    // Bodies radiate to each other, and a single one to a room.
+    let fourth = |v: VariableId| match spec.variable(v).unit_text.as_deref() {
+        Some("K") => Some(format!("({}/100)^4", name(v))),
+        Some("degC") => Some(format!("(({} + 273.15)/100)^4", name(v))),
+        _ => None,
+    };
+    let warm: Vec<(VariableId, String)> = simple
+        .iter()
+        .filter(|&&v| source(v))
+        .filter_map(|&v| Some((v, fourth(v)?)))
+        .collect();
+    let mut radiation: Vec<(String, Vec<VariableId>)> = Vec::new();
+    for (i, (a, of_a)) in warm.iter().enumerate() {
+        for (b, of_b) in &warm[i + 1..] {
+            radiation.push((format!("({of_a} - {of_b})"), vec![*a, *b]));
+        }
+        if warm.len() == 1 {
+            radiation.push((format!("({of_a} - {ROOM})"), vec![*a]));
+        }
+    }
+    found.extend(radiation.into_iter().map(|(text, variables)| {
+        let mut argument = Argument::new(spec, text, variables);
+        argument.form = ArgumentForm::Radiation;
+        argument
+    }));
     found
 }

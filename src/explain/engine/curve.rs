@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::argument::Argument;
+use super::argument::{Argument, ArgumentForm};
 use super::edit::{Place, literal};
 use super::library::{CURVE, Port};
 use super::path::{Hooked, Path};
@@ -88,7 +88,8 @@ pub(super) fn curves(
         let Some(argument) = lead.argument else {
             continue;
         };
-        let of_one = !arguments[argument].product && !arguments[argument].absolute;
+        let form = arguments[argument].form;
+        let of_one = matches!(form, ArgumentForm::Variable | ArgumentForm::Difference);
         let fits = lead.term.port == Port::Equation && lead.term.memories.is_empty() && of_one;
         if fits && !pairs.contains(&(lead.place, argument)) {
             pairs.push((lead.place, argument));

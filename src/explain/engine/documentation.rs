@@ -243,9 +243,9 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
     effect(
         "radiation",
         "heat radiation",
-        "C*der(T) = ... + c*T^4",
+        "C*der(T) = ... + c*(((T + 273.15)/100)^4 - ((Ta + 273.15)/100)^4)",
         ANY_EQUATION,
-        "a temperature in K or degC",
+        "two temperatures in K or degC, or one of them and a room of 20 degC",
         &[like(
             "natural_convection",
             "Heat up to at least twice the usual difference to the surroundings, and record the cooling.",

@@ -22,8 +22,8 @@ pub(crate) enum Needs {
     BothSigns,
     /// Never below zero.
     Positive,
-    /// An absolute temperature.
-    Temperature,
+    /// A difference of fourth powers of absolute temperatures.
+    Radiation,
     /// A difference of two variables of one unit.
     Difference,
     /// An angle that covers half a turn or more.
@@ -141,7 +141,7 @@ const TIMES: &[f64] = &[
     0.9, 0.95,
 ];
 
-use Needs::{Angle, Anything, BothSigns, Difference, Positive, Temperature, Time};
+use Needs::{Angle, Anything, BothSigns, Difference, Positive, Radiation, Time};
 use Port::{Equation, Input, Parameter, Sensor};
 
 /// A function that nobody listed: its text is that of its pieces.
@@ -243,7 +243,7 @@ pub(crate) const TERMS: &[Term] = &[
             ),
         ],
     ),
-    curve("radiation", Equation, Temperature, "{z}^4", &[]),
+    curve("radiation", Equation, Radiation, "{z}", &[]),
     curve(
         "natural_convection",
         Equation,

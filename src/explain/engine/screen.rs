@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::argument::{Argument, arguments};
+use super::argument::{Argument, ArgumentForm, arguments};
 use super::curve::{Curve, curves};
 use super::edit::{Place, sensors};
 use super::library::{Needs, Port, Starts, TERMS, Term};
@@ -119,7 +119,8 @@ pub(crate) fn screen(
         } else {
             let serves = |a: &Argument| {
                 a.spread() > 0.0
-                    && (a.serves(term.needs) || a.product && term.id == "linear")
+                    && (a.serves(term.needs)
+                        || a.form == ArgumentForm::Product && term.id == "linear")
                     && match term.port {
                         Port::Input => a.variables.len() == 1 && inputs.contains(&a.variables[0]),
                         Port::Sensor => a.variables.len() == 1 && shown.contains(&a.variables[0]),

@@ -23,6 +23,7 @@ const IMITATED: f64 = 0.3;
 pub(super) const GLANCE: Effort = Effort {
     iterations: 4,
     settled: 0.3,
+    attempts: 4,
 };
 /// Error of a step where fits are only compared with each other.
 const GLANCED_ACCURACY: f64 = 1e-6;
@@ -32,6 +33,7 @@ const FINISHED: usize = 8;
 pub(super) const THOROUGH: Effort = Effort {
     iterations: 20,
     settled: 0.05,
+    attempts: 8,
 };
 pub(super) const ROUNDS: usize = 2;
 /// Gain in Schwarz's criterion that is needed, beyond the penalty for what was searched: odds of e^8 (math/physics.md).

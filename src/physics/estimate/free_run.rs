@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::adequacy::Question;
 use super::deviance::Deviance;
-use super::optimise::{Effort, Range, minimise};
+use super::optimise::{ATTEMPTS, Effort, Range, minimise};
 use super::problem::Problem;
 use super::{Fit, Form, HOPELESS, ROUND, ROUNDS, SEARCH, SETTLED, residual_tests};
 use crate::noise::Noise;
@@ -13,17 +13,20 @@ use crate::noise::Noise;
 const GLANCE: Effort = Effort {
     iterations: 6,
     settled: 1.0,
+    attempts: ATTEMPTS,
 };
 /// The same where a run takes seconds.
 const COSTLY_GLANCE: Effort = Effort {
     iterations: 2,
     settled: 1.0,
+    attempts: ATTEMPTS,
 };
 /// Factors of the observer's gain on the way to free run, and the effort at each.
 const WEAKER: [f64; 10] = [0.6, 0.35, 0.2, 0.1, 0.05, 0.025, 0.012, 0.006, 0.003, 0.001];
 const CONTINUED: Effort = Effort {
     iterations: 6,
     settled: 0.1,
+    attempts: ATTEMPTS,
 };
 /// First part of the recordings that is fitted when it is made to grow, and the factor by which it grows.
 const GROWN_FROM: f64 = 0.05;

@@ -30,6 +30,7 @@ use self::deviance::Deviance;
 use self::free_run::{
     GLANCED_SAMPLES, coloured_fit, continue_free_run, fit_free_run, leaves_noise,
 };
+use self::optimise::ATTEMPTS;
 pub(crate) use self::optimise::Effort;
 use self::problem::Problem;
 use super::simulated::Simulated;
@@ -120,10 +121,12 @@ const SETTLED: f64 = 0.05;
 const SEARCH: Effort = Effort {
     iterations: 60,
     settled: 1e-2,
+    attempts: ATTEMPTS,
 };
 const ROUND: Effort = Effort {
     iterations: 20,
     settled: 1e-3,
+    attempts: ATTEMPTS,
 };
 /// A criterion that is larger than that of a rival by this is not improved further.
 const HOPELESS: f64 = 200.0;

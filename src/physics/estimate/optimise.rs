@@ -26,6 +26,8 @@ pub(crate) struct Effort {
     pub iterations: usize,
     /// Decrease of the deviance below which the search ends.
     pub settled: f64,
+    /// Attempts at one step.
+    pub attempts: usize,
 }
 
 /// Added to a curvature of 1: what the data do not determine stays where it is.
@@ -34,8 +36,8 @@ pub(super) const RIDGE: f64 = 1e-10;
 const DAMPING: f64 = 1e-3;
 const LESS: f64 = 0.2;
 const MORE: f64 = 5.0;
-/// Attempts at one step.
-const ATTEMPTS: usize = 12;
+/// Attempts at one step of a search that should end at a minimum.
+pub(crate) const ATTEMPTS: usize = 12;
 
 /// Improves `point`; gives its deviance, or none when even the start cannot be simulated.
 pub(super) fn minimise(
@@ -52,7 +54,7 @@ pub(super) fn minimise(
         };
         let before = deviance;
         let mut moved = false;
-        for _ in 0..ATTEMPTS {
+        for _ in 0..effort.attempts {
             let Some(step) = step(&curvature, &descent, point, ranges, damping) else {
                 damping *= MORE;
                 continue;

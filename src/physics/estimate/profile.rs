@@ -2,7 +2,7 @@
 
 use super::Fit;
 use super::deviance::{Covariances, Deviance};
-use super::optimise::{Effort, Objective, Range, minimise};
+use super::optimise::{ATTEMPTS, Effort, Objective, Range, minimise};
 use super::problem::Problem;
 
 /// 95 % point of the chi-square distribution with one degree of freedom.
@@ -15,6 +15,7 @@ const STRAIGHT: (f64, f64) = (0.85 * LEVEL, 1.15 * LEVEL);
 const OTHERS: Effort = Effort {
     iterations: 4,
     settled: 1e-2,
+    attempts: ATTEMPTS,
 };
 /// Values tried on a side.
 const TRIES: usize = 3;

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::*;
-use crate::explain::engine::argument::arguments;
+use crate::explain::engine::argument::{ArgumentForm, arguments};
 use crate::explain::engine::edit::{Place, places, sensors};
 use crate::explain::engine::library::{Needs, Port, TERMS};
 use crate::explain::engine::names::called;
@@ -54,8 +54,8 @@ fn names() -> BTreeSet<&'static str> {
                 for argument in &arguments {
                     // What an argument must be, as far as that does not depend on a recording.
                     let serves = match term.needs {
-                        Needs::Temperature => argument.temperature,
-                        Needs::Difference => argument.difference,
+                        Needs::Radiation => argument.form == ArgumentForm::Radiation,
+                        Needs::Difference => argument.form == ArgumentForm::Difference,
                         Needs::Angle => argument.angle,
                         _ => true,
                     };
