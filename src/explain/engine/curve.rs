@@ -14,7 +14,7 @@ const KNOTS: usize = 9;
 /// Knots that are nearer than this part of the range are one.
 const NEAREST: f64 = 0.03;
 /// Places and arguments that are tried: those of the best terms.
-const PAIRS: usize = 4;
+const PAIRS: usize = 2;
 /// Added to the diagonal of the regression, as a part of it: the straight part of a curve may be what parameters do.
 const RIDGE: f64 = 1e-6;
 

@@ -1,6 +1,7 @@
 //! From score tests to fits: candidates are fitted one by one, ranked by one criterion, and added one after the other.
 
 use rayon::prelude::*;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::candidate::{Candidate, candidate};
 use super::hypothesis::{Ground, Trial, prefer_asked, trials};
@@ -11,13 +12,13 @@ use super::screen::{Lead, Screen, screen};
 use crate::physics::estimate::{
     Effort, EstimateError, EstimateOptions, Fit, PlantRecording, Study,
 };
-use crate::physics::{Hold, Plant};
+use crate::physics::{Hold, ModelSpec, Plant};
 
 /// Leads of each screen that are fitted with the noise of the fit before.
-const GLANCED: usize = 24;
+const GLANCED: usize = 12;
 /// ... of them at most so many of one kind and at one place.
 const OF_A_KIND: usize = 3;
-const AT_A_PLACE: usize = 8;
+const AT_A_PLACE: usize = 6;
 /// The best lead of each term is fitted too where its statistic is at least this part of the best.
 const IMITATED: f64 = 0.3;
 pub(super) const GLANCE: Effort = Effort {
@@ -28,8 +29,8 @@ pub(super) const GLANCE: Effort = Effort {
 /// Error of a step where fits are only compared with each other.
 const GLANCED_ACCURACY: f64 = 1e-6;
 /// The best of these are fitted with a noise model of their own, and the best of them until nothing changes.
-const FITTED: usize = 8;
-const FINISHED: usize = 8;
+const FITTED: usize = 5;
+const FINISHED: usize = 4;
 pub(super) const THOROUGH: Effort = Effort {
     iterations: 20,
     settled: 0.05,
@@ -43,6 +44,8 @@ pub(crate) const NEEDED: f64 = 16.0;
 pub(crate) const SURE: f64 = 24.0;
 /// A second effect must gain more, and at least this part of the first.
 pub(super) const SECOND: (f64, f64) = (30.0, 0.12);
+/// Level of the test that asks for one: of all score tests together.
+const LEFT: f64 = 0.01;
 /// Gains that differ by less, or by this part of the best, are equal.
 pub(crate) const TIE: (f64, f64) = (6.0, 0.08);
 /// Most effects that are named.
@@ -101,7 +104,12 @@ fn searched(lead: &Lead, recordings: &[PlantRecording]) -> f64 {
         .sum()
 }
 
-fn promising(screen: &Screen) -> Vec<Lead> {
+/// Probability of a chi-square with one degree of freedom beyond `statistic`.
+pub(crate) fn chance(statistic: f64) -> f64 {
+    ChiSquared::new(1.0).map_or(1.0, |law| law.sf(statistic))
+}
+
+fn promising(screen: &Screen, spec: &ModelSpec) -> Vec<Lead> {
     let mut kept: Vec<Lead> = Vec::new();
     for lead in &screen.leads {
         let kind = |l: &&Lead| l.term == lead.term;
@@ -121,7 +129,13 @@ fn promising(screen: &Screen) -> Vec<Lead> {
     }
     // What has a name of its own is not crowded out by curves that imitate it.
     let strong = screen.leads.first().map_or(0.0, |l| IMITATED * l.statistic);
-    for lead in screen.leads.iter().filter(|l| l.statistic > strong) {
+    let specific = |l: &&Lead| {
+        let variables = l
+            .argument
+            .map_or(&[][..], |a| &screen.arguments[a].variables);
+        l.statistic > strong && rank_of(spec, l.term, l.place, variables) < SPECIFIC
+    };
+    for lead in screen.leads.iter().filter(specific) {
         if !kept.iter().any(|l| l.term == lead.term) {
             kept.push(lead.clone());
         }
@@ -130,17 +144,35 @@ fn promising(screen: &Screen) -> Vec<Lead> {
     kept
 }
 
-/// Fits the leads of a plant; best first.
-fn step(
-    plant: &Plant,
-    study: &Study,
-    fit: &Fit,
+/// A plant in which something may be missing.
+struct Stage<'a> {
+    plant: &'a Plant,
+    study: &'a Study<'a>,
+    fit: &'a Fit,
+    /// Parameters of the plant before effects were found.
     own: usize,
-    recordings: &[PlantRecording],
-    options: &EstimateOptions,
-    scope: &Scope,
-    open: &[usize],
-) -> (Vec<Fitted>, (f64, usize)) {
+    /// Effects that were found.
+    accepted: usize,
+    recordings: &'a [PlantRecording],
+    options: &'a EstimateOptions,
+    scope: &'a Scope,
+    /// Hypotheses that are not yet part of the plant.
+    open: &'a [usize],
+}
+
+/// Fits the leads of a plant; best first. Also the strongest test, and how many there were.
+fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
+    let Stage {
+        plant,
+        study,
+        fit,
+        own,
+        accepted,
+        recordings,
+        options,
+        scope,
+        open,
+    } = *stage;
     let states = plant.spec.states().len();
     let parameters = study.parameters();
     let outputs = study.outputs();
@@ -151,8 +183,17 @@ fn step(
     let strongest = tried.first().map_or((0.0, 0), |(s, _)| {
         (s.leads.first().map_or(0.0, |l| l.statistic), s.tests)
     });
+    // Beside an effect that was found, a second one is looked for only where a test says that something is left.
+    let nothing_left = accepted > 0 && chance(strongest.0) * strongest.1 as f64 > LEFT;
+    if nothing_left {
+        for (screen, _) in &mut tried {
+            screen.leads.clear();
+            screen.curves.clear();
+        }
+    }
     // A noise model that was fitted where physics is missing absorbs it: the same again under white noise.
-    if let Some(white) = study.least_squares(&fit.point)
+    if !nothing_left
+        && let Some(white) = study.least_squares(&fit.point)
         && let Some(s) = screen(study, &white, own, recordings)
     {
         tried.push((s, white));
@@ -164,7 +205,7 @@ fn step(
         .iter()
         .enumerate()
         .flat_map(|(i, (screen, from))| {
-            promising(screen)
+            promising(screen, &plant.spec)
                 .into_iter()
                 .map(move |lead| (i, screen, from, lead))
         })
@@ -332,7 +373,17 @@ pub(crate) fn search(
         let open: Vec<usize> = (0..asked.len())
             .filter(|&i| asked[i].accepted.is_none())
             .collect();
-        let (fitted, strongest) = step(&now, &study, &fit, own, recordings, &options, scope, &open);
+        let (fitted, strongest) = step(&Stage {
+            plant: &now,
+            study: &study,
+            fit: &fit,
+            own,
+            accepted: accepted_so_far,
+            recordings,
+            options: &options,
+            scope,
+            open: &open,
+        });
         for &i in &open {
             let trial = fitted.iter().find(|f| f.hypothesis == Some(i));
             match count {

@@ -6,13 +6,11 @@ mod question;
 
 pub use question::{PlantOptions, PlantQuestionError};
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-
 use super::answer::extremes;
 use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
 use super::engine::library::Port;
 use super::engine::scope::Scope;
-use super::engine::search::{Fitted, Found, SURE, search};
+use super::engine::search::{Fitted, Found, SURE, chance, search};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
     FitTable, Location, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
@@ -490,11 +488,6 @@ impl Answer<'_> {
         ));
         lines
     }
-}
-
-/// Probability of a chi-square with one degree of freedom beyond `statistic`.
-fn chance(statistic: f64) -> f64 {
-    ChiSquared::new(1.0).map_or(1.0, |law| law.sf(statistic))
 }
 
 /// Share of such answers that were right on the first 37 plants of the physical cases that the engine was developed on; not
