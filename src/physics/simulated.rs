@@ -126,7 +126,7 @@ impl Simulated for Plant {
     }
 
     fn for_search(&self) -> Arc<dyn Simulated> {
-        Arc::new(self.with_accuracy(SEARCH_ACCURACY))
+        Arc::new(self.clone().with_accuracy(SEARCH_ACCURACY))
     }
 
     fn equations(&self) -> Option<&Plant> {

@@ -28,6 +28,9 @@ pub(super) const GLANCE: Effort = Effort {
 };
 /// Error of a step where fits are only compared with each other.
 const GLANCED_ACCURACY: f64 = 1e-6;
+/// Steps a sample that a candidate may need, on average; one that needs more is left out, for the time it costs.
+const GLANCED_STEPS: usize = 20;
+const MOST_STEPS: usize = 60;
 /// The best of these are fitted with a noise model of their own, and the best of them until nothing changes.
 const FITTED: usize = 5;
 const FINISHED: usize = 4;
@@ -214,7 +217,11 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
         .filter_map(|(i, screen, from, lead)| {
             let made = candidate(&plant.spec, &lead, &screen.arguments, recordings)?;
             let options = with_more(options, made.values.len());
-            let rough = made.plant.clone().with_accuracy(GLANCED_ACCURACY);
+            let rough = made
+                .plant
+                .clone()
+                .with_accuracy(GLANCED_ACCURACY)
+                .with_most_steps(GLANCED_STEPS);
             let inner = Study::new(&rough, recordings, &options).ok()?;
             let start = made.from(from, parameters, states, outputs);
             let fitted = inner.refit(&start, 0, GLANCE)?;
@@ -247,7 +254,8 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
         .filter_map(|(lead, which, made, from)| {
             let arguments = &tried[which].0.arguments;
             let options = with_more(options, made.values.len());
-            let inner = Study::new(&made.plant, recordings, &options).ok()?;
+            let limited = made.plant.clone().with_most_steps(MOST_STEPS);
+            let inner = Study::new(&limited, recordings, &options).ok()?;
             let from = Fit {
                 form: fit.form,
                 point: if from.form == fit.form {
@@ -320,7 +328,8 @@ fn finished(
         .take(FINISHED)
         .map(|f| {
             let options = with_more(options, f.candidate.values.len());
-            let inner = Study::new(&f.candidate.plant, recordings, &options).ok()?;
+            let limited = f.candidate.plant.clone().with_most_steps(MOST_STEPS);
+            let inner = Study::new(&limited, recordings, &options).ok()?;
             inner.refit(&f.fit, ROUNDS, THOROUGH)
         })
         .collect();

@@ -223,6 +223,8 @@ pub struct Plant {
     nominal: Option<Vec<f64>>,
     /// Error of a step as a part of how far a state has moved.
     pub(super) accuracy: f64,
+    /// Steps a sample that a run may take on average, where fewer are allowed than is usual.
+    most_steps: Option<usize>,
 }
 
 impl Plant {
@@ -241,6 +243,7 @@ impl Plant {
             linearity,
             nominal: None,
             accuracy: STEP_ACCURACY,
+            most_steps: None,
         }
     }
 
@@ -269,11 +272,15 @@ impl Plant {
     }
 
     /// The plant simulated with steps whose error is this part of how far a state has moved.
-    pub(crate) fn with_accuracy(&self, accuracy: f64) -> Self {
-        Self {
-            accuracy,
-            ..self.clone()
-        }
+    pub(crate) fn with_accuracy(mut self, accuracy: f64) -> Self {
+        self.accuracy = accuracy;
+        self
+    }
+
+    /// The plant whose runs are refused where they need more steps a sample than this, on average.
+    pub(crate) fn with_most_steps(mut self, steps: usize) -> Self {
+        self.most_steps = Some(steps);
+        self
     }
 
     /// Number of instructions of an evaluation.
@@ -305,6 +312,7 @@ impl Plant {
         observer: Option<&Observer>,
     ) -> Result<Trajectory, SimulationError> {
         let most = MOST_STEPS.max(MOST_STEPS_A_SAMPLE * excitation.length);
+        let most = most.min(self.allowed_steps(excitation));
         let moving = self.tape.switches.iter().any(|s| s.moves);
         if !moving {
             return self.run_choosing(point, excitation, observer, Some(&[]), most);
@@ -328,7 +336,13 @@ impl Plant {
         plan: &Plan,
     ) -> Result<Trajectory, SimulationError> {
         let most = (MOST_REPEATED_A_SAMPLE * excitation.length).max(MOST_REPEATED * plan.steps());
+        let most = most.min(self.allowed_steps(excitation));
         self.run_choosing(point, excitation, observer, Some(&plan.widths), most)
+    }
+
+    fn allowed_steps(&self, excitation: &Excitation) -> usize {
+        self.most_steps
+            .map_or(usize::MAX, |steps| steps * excitation.length)
     }
 
     fn check(&self, excitation: &Excitation) -> Result<(), SimulationError> {
