@@ -1,6 +1,9 @@
 //! Changes of a plant's text: terms that enter its equations, and the variables and parameters that they need.
 
-use crate::physics::{ModelSpec, Node, Span, SpecError, Unknown, VariableId, parse};
+use crate::physics::{
+    Binary, ExpressionId, ModelSpec, Node, Span, SpecError, Unknown, VariableId, VariableKind,
+    parse,
+};
 
 /// Where something can enter the equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -112,7 +115,7 @@ fn declaration(p: &NewParameter) -> String {
 }
 
 /// Where the word `equation` and the last `end` stand.
-fn sections(text: &str) -> Option<(usize, usize)> {
+pub(super) fn sections(text: &str) -> Option<(usize, usize)> {
     let bytes = text.as_bytes();
     let (mut at, mut equation, mut end) = (0, None, None);
     while at < bytes.len() {
@@ -252,14 +255,17 @@ fn substituted(text: &str, part: Span, mut pieces: Vec<(Span, String)>) -> Strin
     out
 }
 
-/// Where effects may enter: every equation that is no definition and no plain sensor, every input, and of the parameters the
+/// Where effects may enter: every equation that is no definition (of a rate, of a stretch) and no plain sensor, every input, and of the parameters the
 /// first `own`, but for those that are times of delays.
 pub(crate) fn places(spec: &ModelSpec, own: usize) -> Vec<Place> {
     let mut found = Vec::new();
     for (at, equation) in spec.equations.iter().enumerate() {
         let plain = equation.coefficient.is_none()
             && matches!(spec.expressions.node(equation.rest), Node::Variable(_));
-        if !plain {
+        let kinematic = matches!(equation.unknown, Unknown::Value(_))
+            && equation.coefficient.is_none()
+            && adds_states(spec, equation.rest);
+        if !plain && !kinematic {
             found.push(Place::Equation(at));
         }
     }
@@ -276,6 +282,19 @@ pub(crate) fn places(spec: &ModelSpec, own: usize) -> Vec<Place> {
             .map(Place::Parameter),
     );
     found
+}
+
+/// Whether an expression only adds and subtracts states and their derivatives, as the stretch of a spring: a definition.
+fn adds_states(spec: &ModelSpec, expression: ExpressionId) -> bool {
+    match spec.expressions.node(expression) {
+        Node::Variable(v) => spec.variable(v).kind == VariableKind::State,
+        Node::Derivative(_) => true,
+        Node::Negate(a) => adds_states(spec, a),
+        Node::Binary(Binary::Add | Binary::Subtract, a, b) => {
+            adds_states(spec, a) && adds_states(spec, b)
+        }
+        _ => false,
+    }
 }
 
 /// Whether the time of a delay uses a parameter.
@@ -359,6 +378,26 @@ end Tank;
                 .unwrap_or_else(|e| panic!("{}\n{e}", edit.text(&spec)));
             assert_eq!(changed.parameters().len(), 3);
             assert_eq!(changed.states().len(), 1);
+        }
+    }
+
+    #[test]
+    fn definitions_are_no_places() {
+        let spec = parse(
+            "model M parameter Real k = 2; input Real u; output Real y;
+             Real a; Real va; Real b; Real x = a - b; Real f = k*x; Real s = x + u;
+             equation der(a) = va; der(va) = u - f; der(b) = f - s; y = x; end M;",
+        )
+        .unwrap();
+        let names: Vec<&str> = places(&spec, 1)
+            .iter()
+            .map(|p| spec.variable(p.variable(&spec)).name.as_str())
+            .collect();
+        for name in ["va", "b", "f", "s", "u", "k"] {
+            assert!(names.contains(&name), "{name} of {names:?}");
+        }
+        for name in ["a", "x", "y"] {
+            assert!(!names.contains(&name), "{name} of {names:?}");
         }
     }
 

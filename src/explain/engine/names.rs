@@ -161,21 +161,27 @@ pub(crate) fn called(
 }
 
 /// How specific a term is: of two that explain a recording equally well the one with a name of its own is meant, and where the
-/// same name may enter two equations, that of the variable it is a function of.
+/// same name may enter two equations, that of the variable it is a function of, else that of a derivative, else of an output.
 pub(crate) fn rank(spec: &ModelSpec, found: &Fitted) -> u8 {
     let variables: Vec<VariableId> = found.depends.iter().filter_map(|n| spec.find(n)).collect();
     rank_of(spec, found.lead.term, found.lead.place, &variables)
 }
 
 /// Ranks below this are names of their own.
-pub(super) const SPECIFIC: u8 = 2;
+pub(super) const SPECIFIC: u8 = 4;
 
 /// The rank of a term at a place, as a function of variables.
 pub(super) fn rank_of(spec: &ModelSpec, term: &Term, place: Place, variables: &[VariableId]) -> u8 {
     let (of_place, elsewhere) = match place {
-        Place::Equation(_) => {
-            let own = variables.is_empty() || variables.contains(&place.variable(spec));
-            (0, u8::from(!own && term.port == Port::Equation))
+        Place::Equation(at) => {
+            let own = place.variable(spec);
+            let elsewhere = match spec.equations[at].unknown {
+                _ if variables.contains(&own) || term.port != Port::Equation => 0,
+                Unknown::Derivative(_) => 1,
+                Unknown::Value(_) if spec.variable(own).output => 2,
+                Unknown::Value(_) => 3,
+            };
+            (0, elsewhere)
         }
         Place::Input(_) => (0, 0),
         Place::Parameter(_) => (1, 0),
@@ -186,5 +192,5 @@ pub(super) fn rank_of(spec: &ModelSpec, term: &Term, place: Place, variables: &[
         "input_curve" | "parameter_change" => 2 + of_place,
         _ => of_place,
     };
-    2 * of_name + elsewhere
+    4 * of_name + elsewhere
 }

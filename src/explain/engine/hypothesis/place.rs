@@ -1,7 +1,7 @@
 //! Where a hypothesis enters, and the plant with it.
 
 use super::super::candidate::{Candidate, equation_text, free_name};
-use super::super::edit::{Edit, Place, literal};
+use super::super::edit::{Edit, Place, literal, sections};
 use super::{Change, Hypothesis, HypothesisErrorKind as Kind};
 use crate::physics::{
     Equation, ExpressionId, ModelSpec, Node, Span, SpecErrorKind, Token, Unknown, VariableId,
@@ -279,7 +279,7 @@ impl Hypothesis {
         let text = edit.text(spec);
         let changed = parse(&text).map_err(|e| {
             let new = edit.declarations.len() + usize::from(!matches!(place, Place::Equation(_)));
-            Kind::Unsolved(in_lines_of(&spec.text, &text, new, *e.kind))
+            Kind::Unsolved(in_lines_of(&spec.text, new, *e.kind))
         })?;
         Ok(Candidate {
             equation: equation_text(&changed, spec, place),
@@ -367,16 +367,12 @@ impl Hypothesis {
     }
 }
 
-/// An error of the changed text with the lines of the text before `new` declarations came in.
-fn in_lines_of(before: &str, after: &str, new: usize, mut kind: SpecErrorKind) -> SpecErrorKind {
-    let same = before
-        .lines()
-        .zip(after.lines())
-        .take_while(|(a, b)| a == b)
-        .count();
+/// An error of the changed text with the lines of the text before `new` declarations came in, above its equations.
+fn in_lines_of(before: &str, new: usize, mut kind: SpecErrorKind) -> SpecErrorKind {
+    let above = sections(before).map_or(0, |(at, _)| before[..at].matches('\n').count());
     if let SpecErrorKind::AlgebraicLoop { lines, .. } = &mut kind {
-        for line in lines.iter_mut().filter(|l| **l > same) {
-            *line = line.saturating_sub(new).max(1);
+        for line in lines.iter_mut().filter(|l| **l > above) {
+            *line = line.saturating_sub(new).max(above);
         }
     }
     kind

@@ -104,7 +104,7 @@ fn errors_say_where_and_what_to_type() {
             &["begins with a name", "drag: m*der(v)"][..],
         ),
         ("drag m*der(v) += c*v", 1, &["begins with a name"]),
-        ("a: m*der(v) c*v", 14, &["`+=`", "`=`"]),
+        ("a: m*der(v) c*v", 15, &["`+=`", "`=`"]),
         ("a: m*der(v) == c*v", 13, &["`+=`"]),
         (
             "a: m*der(w) += c*v",
