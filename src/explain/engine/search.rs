@@ -230,14 +230,14 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
         .collect();
     glanced.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut chosen: Vec<(Lead, usize, Candidate, Fit)> = Vec::new();
-    for which in 0..tried.len() {
+    for (which, (screen, _)) in tried.iter().enumerate() {
         let list: Vec<_> = glanced.iter().filter(|g| g.2 == which).collect();
         let most = list.first().map_or(0.0, |g| g.0);
         let close = |g: &&_| {
             let (gain, lead, ..): &(f64, Lead, usize, Candidate, Fit) = g;
             let variables = lead
                 .argument
-                .map_or(&[][..], |a| &tried[which].0.arguments[a].variables);
+                .map_or(&[][..], |a| &screen.arguments[a].variables);
             let specific = rank_of(&plant.spec, lead.term, lead.place, variables) < SPECIFIC;
             *gain > (1.0 - TIE.1) * most && specific
         };
