@@ -51,6 +51,8 @@ pub(super) const SECOND: (f64, f64) = (30.0, 0.12);
 const LEFT: f64 = 0.01;
 /// Gains that differ by less, or by this part of the best, are equal.
 pub(crate) const TIE: (f64, f64) = (6.0, 0.08);
+/// The same where the best is a curve: it is free to follow any effect (math/physics.md, "Fits and decision").
+const TIE_WITH_CURVE: (f64, f64) = (12.0, 0.04);
 /// Most effects that are named.
 const MOST: usize = 2;
 
@@ -306,8 +308,9 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
     fitted.extend(trials(&scope.hypotheses, open, &ground));
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     // Among those that explain the recording as well as the best, the one with a name of its own comes first.
-    if let Some(best) = fitted.first().map(|f| f.gain) {
-        let tie = TIE.0.max(TIE.1 * best);
+    if let Some((best, curve)) = fitted.first().map(|f| (f.gain, f.lead.curve.is_some())) {
+        let (least, part) = if curve { TIE_WITH_CURVE } else { TIE };
+        let tie = least.max(part * best);
         let ties = fitted.iter().take_while(|f| best - f.gain <= tie).count();
         fitted[..ties].sort_by_key(|f| rank(&plant.spec, f));
         prefer_asked(&mut fitted);
