@@ -26,16 +26,6 @@ pub struct Plant {
 }
 
 /// Logs as recordings of a plant.
-fn records(logs: &[Log]) -> Vec<PlantRecording> {
-    let record = |log: &Log| PlantRecording {
-        inputs: log.input_data.clone(),
-        outputs: log.output_data.clone(),
-        sample_time: log.sample_time,
-        start_time: log.start_time,
-    };
-    logs.iter().map(record).collect()
-}
-
 fn hold(name: &str) -> PyResult<Hold> {
     match name {
         "zero" => Ok(Hold::Zero),
@@ -195,7 +185,7 @@ impl Plant {
             least_squares,
         };
         let logs = recordings(&u, &y, dt, &self.inputs(), &self.outputs())?;
-        let records = self::records(&logs);
+        let records = logs.iter().map(PlantRecording::from).collect::<Vec<_>>();
         let start = self.core.with_values(&self.point.parameters);
         py.detach(|| {
             let found = estimate(&start, &records, &options).map_err(raise)?;
@@ -292,7 +282,7 @@ impl Plant {
         };
         let logs = recordings(&u, &y, dt, &self.inputs(), &self.outputs())?;
         py.detach(|| {
-            let records = records(&logs);
+            let records = logs.iter().map(PlantRecording::from).collect::<Vec<_>>();
             let held = document.held_with_starts(&self.core, &self.point);
             let found = evaluate(&self.core, &records, &held).map_err(raise)?;
             plant_page(&self.core, document, &records, &found).map_err(raise)

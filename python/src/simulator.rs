@@ -98,15 +98,7 @@ pub fn estimate_simulator(
         })
         .collect();
     let logs = recordings(&u, &y, dt, &inputs, &outputs)?;
-    let records: Vec<PlantRecording> = logs
-        .iter()
-        .map(|log| PlantRecording {
-            inputs: log.input_data.clone(),
-            outputs: log.output_data.clone(),
-            sample_time: log.sample_time,
-            start_time: log.start_time,
-        })
-        .collect();
+    let records: Vec<PlantRecording> = logs.iter().map(PlantRecording::from).collect();
     let raised = Raised::default();
     let function = Function {
         function,

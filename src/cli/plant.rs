@@ -10,7 +10,6 @@ use super::roles::{RoleFlags, tell_reading};
 use crate::explain::Explanation;
 use crate::identify::{IdentifiedChannel, Recording};
 use crate::log::{Channel, Log, LogError, Reading, RoleNeed, Roles, Source};
-use crate::physics::estimate::PlantRecording;
 use crate::physics::{Hold, Plant, Point, VariableId, diagnose, render_all, unknown_units};
 use crate::report::{PlantDocument, is_explanation, is_plant, parse_explanation};
 
@@ -208,16 +207,6 @@ fn other_names(error: LogError, plant: &Plant) -> anyhow::Error {
         "{error}; where the file has other names than the plant, list its columns with {}, in this order",
         flags.join(" and with ")
     )
-}
-
-/// A log as a recording of the plant.
-pub(super) fn recording(log: &Log) -> PlantRecording {
-    PlantRecording {
-        inputs: log.input_data.clone(),
-        outputs: log.output_data.clone(),
-        sample_time: log.sample_time,
-        start_time: log.start_time,
-    }
 }
 
 /// `name=value` pairs, separated by commas.

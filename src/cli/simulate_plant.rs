@@ -4,14 +4,13 @@ use std::path::Path;
 
 use super::output::note;
 use super::plant::{
-    LoadedPlant, assignments, load, read_recordings, recording, set_parameters, set_start,
-    tell_warnings,
+    LoadedPlant, assignments, load, read_recordings, set_parameters, set_start, tell_warnings,
 };
 use super::roles::RoleFlags;
 use super::validate::all_known;
 use super::{Outcome, Verbosity};
 use crate::log::{Channel, RoleNeed, Source, write_table};
-use crate::physics::estimate::{EstimateOptions, Form, estimate};
+use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
 use crate::physics::{Excitation, Hold, Point};
 use crate::report::{PlantDocument, is_plant};
 
@@ -110,7 +109,7 @@ pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
                 least_squares: true,
             };
             let at_values = plant.with_values(&point.parameters);
-            let found = estimate(&at_values, &[recording(&log)], &options)?;
+            let found = estimate(&at_values, &[PlantRecording::from(&log)], &options)?;
             point.start = found.points[0].start.clone();
         }
     }

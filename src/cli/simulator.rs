@@ -8,7 +8,7 @@ use clap::Args;
 
 use super::numbers;
 use super::output::{Output, check_distinct, note, paths};
-use super::plant::{read_with, recording};
+use super::plant::read_with;
 use super::progress::Progress;
 use super::roles::RoleFlags;
 use super::simulator_command::SimulatorCommand;
@@ -135,7 +135,7 @@ pub(super) fn run(
         form: Some(Form::FreeRun),
         least_squares: chosen.least_squares(),
     };
-    let records: Vec<PlantRecording> = logs.iter().map(recording).collect();
+    let records: Vec<PlantRecording> = logs.iter().map(PlantRecording::from).collect();
     let estimated = estimate(&plant, &records, &options)?;
     let mut document = PlantDocument::new(&plant, &estimated, options.hold);
     document.fit = plant_fits(&plant, &records, &logs, &estimated, options.hold);

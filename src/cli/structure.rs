@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::output::{Output, check_distinct, paths, print};
-use super::plant::{load, read_recordings, recording, tell_warnings};
+use super::plant::{load, read_recordings, tell_warnings};
 use super::roles::RoleFlags;
 use super::terminal::style;
 use super::{Outcome, Verbosity};
@@ -128,7 +128,7 @@ pub(super) fn run(
             log.sample_time,
         )?;
     }
-    let records: Vec<PlantRecording> = logs.iter().map(recording).collect();
+    let records: Vec<PlantRecording> = logs.iter().map(PlantRecording::from).collect();
     let estimated = estimate(plant, &records, &options)
         .map_err(|e| anyhow::anyhow!("{}: {e}", structure.display()))?;
     let mut document = PlantDocument::new(plant, &estimated, hold);

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::numbers;
 use super::output::{check_distinct, print};
-use super::plant::{is_plant_file, load, read_recordings, recording};
+use super::plant::{is_plant_file, load, read_recordings};
 use super::roles::{RoleFlags, tell_reading};
 use super::terminal::style;
 use super::{Outcome, Verbosity};
@@ -154,7 +154,7 @@ fn validate_plant(flags: &Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     let plant = &loaded.plant;
     let (logs, recordings) =
         read_recordings(plant, &flags.logs, &flags.roles, RoleNeed::Identify, say)?;
-    let records: Vec<PlantRecording> = logs.iter().map(recording).collect();
+    let records: Vec<PlantRecording> = logs.iter().map(PlantRecording::from).collect();
     let held = match &loaded.document {
         None => text_alone(&loaded.point, loaded.hold),
         Some(document) => {

@@ -5,11 +5,13 @@
 //! (math/explain.md, choice 3: together they take the false alarms on the hard nulls from 4 of 8 to none).
 
 mod colour;
+mod effective;
 mod estimate;
 
 use statrs::function::gamma::ln_gamma;
 
 pub(crate) use self::colour::Colour;
+pub(crate) use self::effective::effective_samples;
 pub(crate) use self::estimate::Colours;
 
 /// Degrees of freedom that are tried; infinity is Gaussian.
@@ -101,6 +103,15 @@ impl Noise {
             });
         }
         out
+    }
+
+    /// `-2 log` density of one whitened value, but for a constant.
+    pub fn loss(&self, e: f64) -> f64 {
+        if self.degrees.is_finite() {
+            (self.degrees + 1.0) * (e * e / self.degrees).ln_1p()
+        } else {
+            e * e
+        }
     }
 
     /// Weight of one whitened value in a least-squares step.

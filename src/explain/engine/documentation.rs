@@ -123,6 +123,17 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
         ],
     ),
     effect(
+        "viscous_friction",
+        "force against the speed, in proportion to it",
+        "J*der(w) = ... + c*w",
+        ANY_EQUATION,
+        "the speed itself",
+        &[like(
+            "quadratic_drag",
+            "Coast down from the highest speed: under quadratic drag the speed falls fast at first and slowly later.",
+        )],
+    ),
+    effect(
         "quadratic_drag",
         "drag with the square of the speed",
         "m*der(v) = ... + c*v*abs(v)",
@@ -514,6 +525,17 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
         &[like(
             "actuator_lag",
             "Start from another initial state without an input: only a sensor lags then.",
+        )],
+    ),
+    effect(
+        "sensor_rectification",
+        "sensor that loses the sign",
+        "y = abs(...)",
+        A_SENSOR,
+        SHOWN,
+        &[like(
+            "input_saturation",
+            "Drive the output slowly through zero: a rectified signal has a corner there.",
         )],
     ),
     effect(

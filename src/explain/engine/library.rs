@@ -435,6 +435,17 @@ pub(crate) const TERMS: &[Term] = &[
         units: &[],
     },
     Term {
+        id: "sensor_rectification",
+        port: Sensor,
+        needs: Anything,
+        form: "abs({z}) - {z}",
+        memories: &[],
+        shapes: &[],
+        free_strength: false,
+        symbol: "",
+        units: &[],
+    },
+    Term {
         id: "sensor_saturation",
         port: Sensor,
         needs: Anything,

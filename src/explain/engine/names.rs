@@ -32,9 +32,18 @@ fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
         .states()
         .iter()
         .any(|&v| defines(spec, v) || matches!(unit(v), "m/s" | "rad/s"));
+    // Of a position only the velocity need be known: `der(x) = v` with a state `v`.
+    let states = spec.states();
+    let moves_by = |x: VariableId| {
+        spec.equations.iter().any(|e| {
+            e.unknown == Unknown::Derivative(x)
+                && e.coefficient.is_none()
+                && matches!(spec.expressions.node(e.rest), Node::Variable(v) if states.contains(&v))
+        })
+    };
     if all(&|v| defines(spec, v) || matches!(unit(v), "m/s" | "rad/s" | "rpm" | "rev/min")) {
         Kind::Velocity
-    } else if moves && all(&|v| matches!(unit(v), "m" | "rad" | "deg" | "mm")) {
+    } else if all(&moves_by) || moves && all(&|v| matches!(unit(v), "m" | "rad" | "deg" | "mm")) {
         Kind::Position
     } else if all(&|v| matches!(unit(v), "K" | "degC")) {
         Kind::Temperature
@@ -62,11 +71,16 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
     let id = called(spec, found.lead.term, found.lead.place, &variables);
     // Values of the fit decide between names of one term.
     let low = |shape: f64| shape < 0.5 * (found.range.0 + found.range.1);
+    let fastest = found.range.0.abs().max(found.range.1.abs());
     match (id, found.shapes.first()) {
         ("hysteresis", Some(&slip))
             if kind(spec, &variables) == Kind::Velocity && slip < YIELDS * found.travel =>
         {
             "coulomb_friction"
+        }
+        // Dry friction is the same at every speed but the lowest.
+        ("coulomb_friction" | "stribeck_friction", Some(&width)) if width > SATURATES * fastest => {
+            "law"
         }
         ("overflow", Some(&edge)) if found.lead.term.id == "root_above" && low(edge) => "leak",
         _ => id,
@@ -75,6 +89,9 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
 
 /// Bristles that yield within this part of the travel are dry friction.
 const YIELDS: f64 = 0.12;
+
+/// Friction that needs more than this part of the highest speed to come up is not dry: at half of it, it is still below 99 %.
+const SATURATES: f64 = 0.2;
 
 /// The id of a term at a place, as a function of variables. Each but `hypothesis`, which has a name of its own, is described in
 /// [`documentation`](super::documentation).
@@ -151,6 +168,12 @@ pub(crate) fn called(
                     "temperature_dependent_resistance"
                 } else {
                     "law"
+                }
+            } else if *variables == [own] {
+                match what {
+                    Kind::Velocity => "viscous_friction",
+                    _ if flows(unit_of_place) => "leak",
+                    _ => "law",
                 }
             } else {
                 "cross_coupling"

@@ -4,13 +4,14 @@ use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::candidate::{Candidate, candidate};
+use super::holdout::HeldOut;
 use super::hypothesis::{Ground, Trial, prefer_asked, trials};
 use super::library::Starts;
 use super::names::{SPECIFIC, named, rank, rank_of};
 use super::scope::Scope;
 use super::screen::{Lead, Screen, screen};
 use crate::physics::estimate::{
-    Effort, EstimateError, EstimateOptions, Fit, PlantRecording, Study,
+    Effort, EstimateError, EstimateOptions, Fit, Form, PlantRecording, Study,
 };
 use crate::physics::{Hold, ModelSpec, Plant};
 
@@ -30,7 +31,7 @@ pub(super) const GLANCE: Effort = Effort {
 const GLANCED_ACCURACY: f64 = 1e-6;
 /// Steps a sample that a candidate may need, on average; one that needs more is left out, for the time it costs.
 const GLANCED_STEPS: usize = 20;
-const MOST_STEPS: usize = 60;
+pub(super) const MOST_STEPS: usize = 30;
 /// The best of these are fitted with a noise model of their own, and the best of them until nothing changes.
 const FITTED: usize = 5;
 const FINISHED: usize = 4;
@@ -53,6 +54,11 @@ const LEFT: f64 = 0.01;
 pub(crate) const TIE: (f64, f64) = (6.0, 0.08);
 /// The same where the best is a curve: it is free to follow any effect (math/physics.md, "Fits and decision").
 const TIE_WITH_CURVE: (f64, f64) = (12.0, 0.04);
+/// A gain must not rest on so few values: they may be errors of the recording.
+const FEW: usize = 1;
+/// A better fit of the plant itself is taken from here on, and so often at most.
+const BETTER: f64 = 1.0;
+const BETTER_FITS: usize = 2;
 /// Most effects that are named.
 const MOST: usize = 2;
 
@@ -79,11 +85,12 @@ pub(crate) struct Fitted {
 
 /// What the search has found.
 pub(crate) struct Found {
+    pub given: Plant,
     pub baseline: Fit,
     /// Effects in the order in which they were added, each with its rivals, best first.
     pub steps: Vec<Vec<Fitted>>,
-    /// The strongest test at the end, and how many there were.
-    pub left: (f64, usize),
+    /// The strongest test before the first effect, after it, and so on, and how many there were.
+    pub tests: Vec<(f64, usize)>,
     /// The plant with everything that was accepted, its fit, and the covariance of its numbers.
     pub plant: Plant,
     pub fit: Fit,
@@ -91,6 +98,77 @@ pub(crate) struct Found {
     /// What the recordings say about each hypothesis.
     pub trials: Vec<Trial>,
     pub options: EstimateOptions,
+    /// Information in a value of what the fit leaves, as a part of that in a value with independent noise.
+    pub information: f64,
+    /// Free runs in blocks that the fit had not seen, without and with the effects; none where the plant does not run freely.
+    pub held_out: Option<[HeldOut; 2]>,
+}
+
+/// What fits are compared by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Objective {
+    /// The likelihood of the recordings, with a noise model or an observer.
+    Likelihood,
+    /// The mean square of the error of the free run, with as many values as are independent.
+    FreeRun,
+}
+
+impl Found {
+    /// The strongest test at the end, and how many there were.
+    pub fn left(&self) -> (f64, usize) {
+        self.tests.get(self.accepted).copied().unwrap_or_default()
+    }
+
+    /// The plant with so many effects, and its fit.
+    pub fn stage(&self, accepted: usize) -> (&Plant, &Fit) {
+        match accepted.checked_sub(1) {
+            _ if accepted == self.accepted => (&self.plant, &self.fit),
+            None => (&self.given, &self.baseline),
+            Some(last) => (
+                &self.steps[last][0].candidate.plant,
+                &self.steps[last][0].fit,
+            ),
+        }
+    }
+
+    /// Drops all effects but the first `accepted`.
+    pub fn keep(&mut self, accepted: usize) {
+        if accepted >= self.accepted {
+            return;
+        }
+        let (plant, fit) = self.stage(accepted);
+        (self.plant, self.fit) = (plant.clone(), fit.clone());
+        self.options
+            .free
+            .truncate(self.plant.spec.parameters().len());
+        self.accepted = accepted;
+        for trial in &mut self.trials {
+            trial.accepted = trial.accepted.filter(|&step| step < accepted);
+        }
+    }
+}
+
+impl Fitted {
+    /// The gain without the [`FEW`] values that it owes most to.
+    fn gain_without_few(&self, study: &Study, before: &Fit, options: &EstimateOptions) -> f64 {
+        let options = with_more(options, self.candidate.values.len());
+        let lost = || {
+            let own = study.of(&self.candidate.plant, &options).ok()?;
+            let noise = &self.fit.noise;
+            let losses = |of: &Study, fit: &Fit| -> Option<Vec<f64>> {
+                let whitened = noise.whiten_kept(&of.residual(fit)?, of.mask());
+                Some(whitened.into_iter().map(|e| noise.loss(e)).collect())
+            };
+            let (old, new) = (losses(study, before)?, losses(&own, &self.fit)?);
+            let mut decrease: Vec<f64> = old.iter().zip(&new).map(|(a, b)| a - b).collect();
+            let whole: f64 = decrease.iter().sum();
+            decrease.sort_by(|a, b| b.total_cmp(a));
+            let few: f64 = decrease.iter().take(FEW).sum();
+            Some(few / whole.max(few))
+        };
+        let deviance = study.information() * (before.deviance - self.fit.deviance);
+        self.gain - lost().unwrap_or(0.0) * deviance
+    }
 }
 
 /// Penalty for the values of a shape that were searched.
@@ -165,6 +243,28 @@ struct Stage<'a> {
     open: &'a [usize],
 }
 
+/// The fit of the plant alone from where a candidate has led, where that is better: what the term seemed to gain was a better
+/// fit of the plant's own parameters.
+fn improved(stage: &Stage, fitted: &[Fitted]) -> Option<Fit> {
+    let first = stage.study.parameters();
+    let best = fitted
+        .iter()
+        .filter(|f| f.hypothesis.is_none() && f.gain > NEEDED);
+    best.take(FINISHED)
+        .filter(|f| f.candidate.new_states == 0)
+        .filter_map(|f| {
+            let mut point = f.fit.point.clone();
+            point.drain(first..first + f.candidate.values.len());
+            let from = Fit {
+                point,
+                ..f.fit.clone()
+            };
+            stage.study.refit(&from, 1, THOROUGH)
+        })
+        .filter(|again| again.criterion < stage.fit.criterion - BETTER)
+        .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+}
+
 /// Fits the leads of a plant; best first. Also the strongest test, and how many there were.
 fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
     let Stage {
@@ -186,10 +286,12 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
         tried.push((s, fit.clone()));
     }
     let strongest = tried.first().map_or((0.0, 0), |(s, _)| {
-        (s.leads.first().map_or(0.0, |l| l.statistic), s.tests)
+        let best = s.leads.first().map_or(0.0, |l| l.statistic);
+        (study.information() * best, s.tests)
     });
     // Beside an effect that was found, a second one is looked for only where a test says that something is left.
-    let nothing_left = accepted > 0 && chance(strongest.0) * strongest.1 as f64 > LEFT;
+    let insignificant = chance(strongest.0) * strongest.1 as f64 > LEFT;
+    let nothing_left = accepted > 0 && insignificant || accepted == MOST;
     if nothing_left {
         for (screen, _) in &mut tried {
             screen.leads.clear();
@@ -198,10 +300,17 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
     }
     // A noise model that was fitted where physics is missing absorbs it: the same again under white noise.
     if !nothing_left
+        && !options.least_squares
         && let Some(white) = study.least_squares(&fit.point)
+        && study.follows(&white)
         && let Some(s) = screen(study, &white, own, recordings)
     {
         tried.push((s, white));
+    }
+    // Where there is no free run to look at, what no test finds is what a candidate does to the observer.
+    if tried.len() == 1 && insignificant && !options.least_squares {
+        tried[0].0.leads.clear();
+        tried[0].0.curves.clear();
     }
     for (screen, _) in &mut tried {
         scope.restrict(&plant.spec, screen);
@@ -224,7 +333,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
                 .clone()
                 .with_accuracy(GLANCED_ACCURACY)
                 .with_most_steps(GLANCED_STEPS);
-            let inner = Study::new(&rough, recordings, &options).ok()?;
+            let inner = study.of(&rough, &options).ok()?;
             let start = made.from(from, parameters, states, outputs);
             let fitted = inner.refit(&start, 0, GLANCE)?;
             Some((from.deviance - fitted.deviance, lead, i, made, fitted))
@@ -257,7 +366,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
             let arguments = &tried[which].0.arguments;
             let options = with_more(options, made.values.len());
             let limited = made.plant.clone().with_most_steps(MOST_STEPS);
-            let inner = Study::new(&limited, recordings, &options).ok()?;
+            let inner = study.of(&limited, &options).ok()?;
             let from = Fit {
                 form: fit.form,
                 point: if from.form == fit.form {
@@ -294,7 +403,8 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
             })
         })
         .collect();
-    let mut fitted = finished(fitted, fit, recordings, options);
+    let mut fitted = finished(fitted, study, fit, recordings, options);
+    fitted.retain(|f| f.gain <= NEEDED || f.gain_without_few(study, fit, options) > NEEDED);
     let mut origins = vec![fit];
     origins.extend(tried.iter().skip(1).map(|(_, white)| white));
     let ground = Ground {
@@ -321,6 +431,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
 /// The best of all fits, fitted until nothing changes; the others as they are. Best first.
 fn finished(
     mut fitted: Vec<Fitted>,
+    study: &Study,
     before: &Fit,
     recordings: &[PlantRecording],
     options: &EstimateOptions,
@@ -332,7 +443,7 @@ fn finished(
         .map(|f| {
             let options = with_more(options, f.candidate.values.len());
             let limited = f.candidate.plant.clone().with_most_steps(MOST_STEPS);
-            let inner = Study::new(&limited, recordings, &options).ok()?;
+            let inner = study.of(&limited, &options).ok()?;
             inner.refit(&f.fit, ROUNDS, THOROUGH)
         })
         .collect();
@@ -364,38 +475,62 @@ pub(crate) fn search(
     recordings: &[PlantRecording],
     hold: Hold,
     scope: &Scope,
+    objective: Objective,
 ) -> Result<Found, EstimateError> {
+    let least_squares = objective == Objective::FreeRun;
     let mut options = EstimateOptions {
         free: vec![true; plant.spec.parameters().len()],
         hold,
         form: None,
-        least_squares: false,
+        least_squares,
     };
     let study = Study::new(plant, recordings, &options)?;
-    let baseline = study.fit(None)?;
+    let mut baseline = study.fit(least_squares.then_some(Form::FreeRun))?;
     let mut steps: Vec<Vec<Fitted>> = Vec::new();
     let mut now = plant.clone();
     let mut fit = baseline.clone();
-    let mut left = (0.0, 0);
+    let mut tests = Vec::new();
     let own = plant.spec.parameters().len();
     let mut accepted_so_far = 0;
     let mut asked = vec![Trial::default(); scope.hypotheses.len()];
     for count in 0..=MOST {
-        let study = Study::new(&now, recordings, &options)?;
+        let mut study = Study::new(&now, recordings, &options)?;
+        if least_squares {
+            let share = study.effective_share(&fit).unwrap_or(1.0);
+            study = study.with_information(share);
+            fit.criterion = study.criterion(&fit);
+        }
         let open: Vec<usize> = (0..asked.len())
             .filter(|&i| asked[i].accepted.is_none())
             .collect();
-        let (fitted, strongest) = step(&Stage {
-            plant: &now,
-            study: &study,
-            fit: &fit,
-            own,
-            accepted: accepted_so_far,
-            recordings,
-            options: &options,
-            scope,
-            open: &open,
-        });
+        let mut attempts = 0;
+        let (fitted, strongest) = loop {
+            let stage = Stage {
+                plant: &now,
+                study: &study,
+                fit: &fit,
+                own,
+                accepted: accepted_so_far,
+                recordings,
+                options: &options,
+                scope,
+                open: &open,
+            };
+            let found = step(&stage);
+            attempts += 1;
+            let again = (attempts <= BETTER_FITS).then(|| improved(&stage, &found.0));
+            let Some(better) = again.flatten() else {
+                break found;
+            };
+            match steps.last_mut().and_then(|s| s.first_mut()) {
+                None => baseline = better.clone(),
+                Some(last) => {
+                    last.gain += last.fit.criterion - better.criterion;
+                    last.fit = better.clone();
+                }
+            }
+            fit = better;
+        };
         for &i in &open {
             let trial = fitted.iter().find(|f| f.hypothesis == Some(i));
             match count {
@@ -403,7 +538,7 @@ pub(crate) fn search(
                 _ => asked[i].beside = trial.map(|f| f.gain),
             }
         }
-        left = strongest;
+        tests.push(strongest);
         let needed = match steps.first().and_then(|s| s.first()) {
             None => NEEDED,
             Some(first) => SECOND.0.max(SECOND.1 * first.gain),
@@ -415,7 +550,8 @@ pub(crate) fn search(
             first.is_none_or(|first| {
                 let id = named(&now.spec, f);
                 f.hypothesis.is_some()
-                    || !matches!(id, "law" | "cross_coupling") && id != named(&plant.spec, first)
+                    || !matches!(id, "law" | "cross_coupling" | "viscous_friction")
+                        && id != named(&plant.spec, first)
             })
         };
         let best = fitted.first().filter(new);
@@ -436,13 +572,16 @@ pub(crate) fn search(
         accepted_so_far += 1;
     }
     Ok(Found {
+        given: plant.clone(),
         baseline,
         steps,
-        left,
+        tests,
         plant: now,
         fit,
         accepted: accepted_so_far,
         trials: asked,
         options,
+        information: 1.0,
+        held_out: None,
     })
 }

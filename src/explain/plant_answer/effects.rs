@@ -9,7 +9,7 @@ use crate::explain::engine::library::Port;
 use crate::explain::engine::search::{Fitted, NEEDED};
 use crate::explain::engine::values::filled;
 use crate::explain::explanation::{Alternative, EffectFound, Evidence, Law, Quantity, Verdict};
-use crate::physics::{Excitation, Hold, Plant, parse};
+use crate::physics::{Excitation, Hold, Plant, VariableId, parse};
 
 /// Points of a law.
 const LAW_POINTS: usize = 41;
@@ -29,15 +29,8 @@ impl Answer<'_> {
         let name = |v| before.variable(v).column().to_owned();
         let (at, enters) = (name(at), name(entered));
         let covariance = self.whole.covariance(&self.found.fit);
-        let spec = &self.found.plant.spec;
-        let names: Vec<&str> = spec
-            .parameters()
-            .iter()
-            .map(|&v| spec.variable(v).name.as_str())
-            .collect();
         let mut parameters = BTreeMap::new();
-        for name in &fitted.candidate.names {
-            let at = names.iter().position(|n| n == name)?;
+        for (name, at) in self.parameters_of(fitted) {
             let std = covariance[(at, at)].max(0.0).sqrt();
             parameters.insert(
                 name.clone(),
@@ -49,7 +42,6 @@ impl Answer<'_> {
             );
         }
         let depends = match fitted.lead.term.port {
-            Port::Sensor if !fitted.depends.is_empty() => vec![enters.clone()],
             _ if fitted.depends.is_empty() && fitted.lead.term.form.contains("time") => {
                 vec!["time".to_owned()]
             }
@@ -103,24 +95,37 @@ impl Answer<'_> {
         })
     }
 
-    /// What is added to an equation, as a curve of its one argument, with its standard deviation.
-    fn law(&self, fitted: &Fitted) -> Option<Law> {
-        let term = fitted.lead.term;
-        if term.port != Port::Equation || !term.memories.is_empty() || fitted.depends.len() != 1 {
-            return None;
-        }
+    /// The parameters of an effect, with their positions among those of the whole plant.
+    fn parameters_of<'f>(
+        &'f self,
+        fitted: &'f Fitted,
+    ) -> impl Iterator<Item = (&'f String, usize)> + 'f {
         let spec = &self.found.plant.spec;
-        let names: Vec<&str> = spec
-            .parameters()
-            .iter()
-            .map(|&v| spec.variable(v).name.as_str())
-            .collect();
-        let at_point: Vec<usize> = fitted
+        let position = |name: &str| {
+            let called = |&v: &VariableId| spec.variable(v).name == name;
+            spec.parameters().iter().position(called)
+        };
+        fitted
             .candidate
             .names
             .iter()
-            .filter_map(|n| names.iter().position(|m| m == n))
-            .collect();
+            .filter_map(move |name| Some((name, position(name)?)))
+    }
+
+    /// What is added to an equation, as a curve of its one argument, with its standard deviation.
+    fn law(&self, fitted: &Fitted) -> Option<Law> {
+        let term = fitted.lead.term;
+        if term.port != Port::Equation || !term.memories.is_empty() {
+            return None;
+        }
+        // Of a difference or a product of variables, it is the curve of that.
+        let variable = match fitted.depends.as_slice() {
+            [] => return None,
+            [one] => one.clone(),
+            _ if fitted.hypothesis.is_some() => return None,
+            _ => fitted.argument.clone(),
+        };
+        let at_point: Vec<usize> = self.parameters_of(fitted).map(|(_, at)| at).collect();
         let values: Vec<f64> = at_point.iter().map(|&i| self.found.fit.point[i]).collect();
         let (low, high) = fitted.range;
         let at: Vec<f64> = (0..LAW_POINTS)
@@ -152,7 +157,7 @@ impl Answer<'_> {
             variance.max(0.0).sqrt()
         });
         Some(Law {
-            variable: fitted.depends[0].clone(),
+            variable,
             std: std.collect(),
             value,
             at,
@@ -188,7 +193,10 @@ impl Answer<'_> {
             None => {
                 let shapes: Vec<String> = values.iter().map(|v| format!("({v:e})")).collect();
                 let strength = shapes.last()?;
-                let argument = fitted.argument.replace(&fitted.depends[0], "z");
+                let argument = match fitted.depends.as_slice() {
+                    [one] => fitted.argument.replace(one, "z"),
+                    _ => "z".to_owned(),
+                };
                 let form = filled(term.form, term, &argument, &[], &shapes, 1.0);
                 format!("{strength}*({form})")
             }

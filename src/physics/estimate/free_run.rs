@@ -7,7 +7,7 @@ use super::deviance::Deviance;
 use super::optimise::{ATTEMPTS, Effort, Range, minimise};
 use super::problem::Problem;
 use super::{Fit, Form, HOPELESS, ROUND, ROUNDS, SEARCH, SETTLED, residual_tests};
-use crate::noise::Noise;
+use crate::noise::{Noise, Series};
 
 /// Effort for a first look at a start.
 const GLANCE: Effort = Effort {
@@ -66,10 +66,32 @@ pub(super) fn continue_free_run(problem: &Problem, innovation: &Fit) -> Option<F
             Deviance::new(problem, Form::Innovation, Noise::unit(problem.outputs()));
         objective.noise = objective.rescale(&point)?;
         minimise(&mut objective, &mut point, &ranges, CONTINUED)?;
+        // Of an unstable plant there is no free run to be reached.
+        if !follows(problem, &objective.residual(&point)?) {
+            return None;
+        }
     }
     point.truncate(numbers);
     white_fit(problem, &mut point, SEARCH)?;
     coloured_fit(problem, point, innovation.criterion)
+}
+
+/// Whether what is left of each output is smaller than its spread about its mean.
+pub(super) fn follows(problem: &Problem, residual: &Series) -> bool {
+    let l = problem.outputs();
+    (0..l).all(|o| {
+        let (mut left, mut values) = (0.0, Vec::new());
+        let recorded = problem.recordings.iter().map(|r| &r.outputs[o]);
+        for (e, y) in residual.iter().skip(o).step_by(l).zip(recorded) {
+            let known = e.iter().zip(y).filter(|(_, y)| y.is_finite());
+            for (e, y) in known {
+                left += e * e;
+                values.push(*y);
+            }
+        }
+        let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+        left < values.iter().map(|y| (y - mean).powi(2)).sum()
+    })
 }
 
 /// The fit in free run from the values of the text and, unless that leaves white noise that does not depend on the inputs, from

@@ -1,9 +1,10 @@
 //! The innovation form: an observer with a constant gain, estimated with the parameters.
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::deviance::Deviance;
-use super::optimise::{Range, minimise};
+use super::optimise::{Effort, Range, minimise};
 use super::problem::Problem;
 use super::{Fit, Form, ROUND, ROUNDS, SEARCH, SETTLED};
 use crate::noise::{Colours, Noise};
@@ -14,6 +15,13 @@ use crate::physics::simulation::LinearPlant;
 const DIFFUSION: [f64; 4] = [1e-3, 1e-2, 1e-1, 1.0];
 /// Measurement noise as a part of the spread of each output.
 const MEASUREMENT: f64 = 0.02;
+/// Gains that are searched from, rounds under white Gaussian noise, and the effort of these.
+const SEARCHED: usize = 2;
+const ROUGH: usize = 2;
+const APPROACH: Effort = Effort {
+    settled: 0.5,
+    ..SEARCH
+};
 /// Steps of the Riccati equation.
 const STEPS: usize = 300;
 
@@ -45,41 +53,49 @@ pub(super) fn fit(problem: &Problem, from: Option<&[f64]>) -> Option<Fit> {
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut ranges = problem.ranges();
     ranges.extend(unbounded(n * l));
-    let mut best: Option<Fit> = None;
-    for (_, mut point) in starts.into_iter().take(2) {
-        let mut objective = Deviance::new(problem, Form::Innovation, Noise::unit(l));
-        let mut last = f64::INFINITY;
-        for round in 0..ROUNDS + 2 {
-            let Some(residual) = objective.residual(&point) else {
-                break;
-            };
-            objective.noise = if round < 2 {
-                Noise::white(&residual, l, &problem.mask)
-            } else {
-                Noise::estimate(&residual, l, &problem.mask, Colours::White)
-            };
-            let effort = if round < 2 { SEARCH } else { ROUND };
-            let Some(deviance) = minimise(&mut objective, &mut point, &ranges, effort) else {
-                break;
-            };
-            let settled = last - deviance < SETTLED;
-            last = deviance;
-            if settled && round >= 2 {
-                break;
-            }
-        }
-        let criterion = problem.criterion(last, objective.noise.len(), n * l);
-        if last.is_finite() && best.as_ref().is_none_or(|b| criterion < b.criterion) {
-            best = Some(Fit {
-                form: Form::Innovation,
-                point,
-                noise: objective.noise,
-                deviance: last,
-                criterion,
-            });
+    starts.truncate(SEARCHED);
+    let found: Vec<Fit> = starts
+        .into_par_iter()
+        .filter_map(|(_, point)| from_start(problem, point, &ranges))
+        .collect();
+    found
+        .into_iter()
+        .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+}
+
+/// The fit from a start: under white Gaussian noise first, then with the tails that are found.
+fn from_start(problem: &Problem, mut point: Vec<f64>, ranges: &[Range]) -> Option<Fit> {
+    let l = problem.outputs();
+    let mut objective = Deviance::new(problem, Form::Innovation, Noise::unit(l));
+    let mut last = f64::INFINITY;
+    for round in 0..ROUNDS + ROUGH {
+        let Some(residual) = objective.residual(&point) else {
+            break;
+        };
+        objective.noise = if round < ROUGH {
+            Noise::white(&residual, l, &problem.mask)
+        } else {
+            Noise::estimate(&residual, l, &problem.mask, Colours::White)
+        };
+        let effort = if round < ROUGH { APPROACH } else { ROUND };
+        let Some(deviance) = minimise(&mut objective, &mut point, ranges, effort) else {
+            break;
+        };
+        let settled = last - deviance < SETTLED;
+        last = deviance;
+        if settled && round >= ROUGH {
+            break;
         }
     }
-    best
+    let of_gain = problem.states() * l;
+    let criterion = problem.criterion(last, objective.noise.len(), of_gain);
+    last.is_finite().then_some(Fit {
+        form: Form::Innovation,
+        point,
+        noise: objective.noise,
+        deviance: last,
+        criterion,
+    })
 }
 
 /// Ranges of numbers without bounds, such as the elements of a gain.

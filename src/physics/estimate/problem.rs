@@ -7,6 +7,7 @@ use rand::{RngExt, SeedableRng};
 
 use super::EstimateOptions;
 use super::optimise::Range;
+use crate::log::Log;
 use crate::noise::{Colours, Mask, Noise, Series};
 use crate::physics::external::ExternalError;
 use crate::physics::simulated::{RunError, Simulated};
@@ -24,6 +25,17 @@ pub struct PlantRecording {
     pub sample_time: f64,
     /// Time of the first sample.
     pub start_time: f64,
+}
+
+impl From<&Log> for PlantRecording {
+    fn from(log: &Log) -> Self {
+        Self {
+            inputs: log.input_data.clone(),
+            outputs: log.output_data.clone(),
+            sample_time: log.sample_time,
+            start_time: log.start_time,
+        }
+    }
 }
 
 /// Why a plant cannot be estimated.

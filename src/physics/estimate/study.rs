@@ -3,18 +3,20 @@
 use nalgebra::DMatrix;
 
 use super::deviance::Deviance;
-use super::free_run::white_fit;
+use super::free_run::{follows, white_fit};
 use super::observer::unbounded;
 use super::optimise::{Effort, minimise};
 use super::problem::{EstimateError, PlantRecording, Problem};
 use super::{EstimateOptions, Fit, Form, SEARCH, best_fit};
-use crate::noise::{Colours, Mask, Noise, Series};
+use crate::noise::{Colours, Mask, Noise, Series, effective_samples};
 use crate::physics::simulation::{Observer, Plant, Point, Trajectory};
 
 /// A problem of estimation that is looked at from several sides.
 pub(crate) struct Study<'a> {
     problem: Problem<'a>,
     plant: &'a Plant,
+    /// Information in a value, as a part of that in a value with independent noise.
+    information: f64,
 }
 
 impl<'a> Study<'a> {
@@ -26,7 +28,49 @@ impl<'a> Study<'a> {
         Ok(Self {
             problem: Problem::new(plant, recordings, options)?,
             plant,
+            information: 1.0,
         })
+    }
+
+    /// The same for another plant.
+    pub fn of(
+        &self,
+        plant: &'a Plant,
+        options: &'a EstimateOptions,
+    ) -> Result<Self, EstimateError> {
+        let other = Self::new(plant, self.problem.recordings, options)?;
+        Ok(Self {
+            information: self.information,
+            ..other
+        })
+    }
+
+    /// The same where a value counts as this part of one with independent noise: least squares takes what a free run leaves
+    /// as white, which it is not.
+    pub fn with_information(self, information: f64) -> Self {
+        Self {
+            information,
+            ..self
+        }
+    }
+
+    /// Information in a value, as a part of that in a value with independent noise.
+    pub fn information(&self) -> f64 {
+        self.information
+    }
+
+    /// Effective samples of what a fit leaves, over all samples.
+    pub fn effective_share(&self, fit: &Fit) -> Option<f64> {
+        let residual = self.residual(fit)?;
+        Some(effective_samples(&residual, &self.problem.mask) / self.count().max(1) as f64)
+    }
+
+    /// Schwarz's criterion of a fit, with the information that values have here.
+    pub fn criterion(&self, fit: &Fit) -> f64 {
+        let of_gain = fit.point.len() - self.problem.nominal().len();
+        let numbers = self.problem.nominal().len() + fit.noise.len() + of_gain;
+        let values = (self.information * self.count() as f64).max(1.0);
+        self.information * fit.deviance + numbers as f64 * values.ln()
     }
 
     /// The likelier form of free run and observer, as [`estimate`](super::estimate) finds it.
@@ -40,14 +84,15 @@ impl<'a> Study<'a> {
         let deviance = white_fit(&self.problem, &mut point, SEARCH)?;
         let objective = Deviance::new(&self.problem, Form::FreeRun, Noise::unit(self.outputs()));
         let noise = objective.rescale(&point)?;
-        let criterion = self.problem.criterion(deviance, noise.len(), 0);
-        Some(Fit {
+        let fit = Fit {
             form: Form::FreeRun,
             point,
             noise,
             deviance,
-            criterion,
-        })
+            criterion: 0.0,
+        };
+        let criterion = self.criterion(&fit);
+        Some(Fit { criterion, ..fit })
     }
 
     /// A fit from a point with the noise of another, and then `rounds` times with a noise model of its own.
@@ -70,17 +115,15 @@ impl<'a> Study<'a> {
             };
             deviance = minimise(&mut objective, &mut point, &ranges, effort)?;
         }
-        let of_gain = point.len() - self.problem.nominal().len();
-        let criterion = self
-            .problem
-            .criterion(deviance, objective.noise.len(), of_gain);
-        Some(Fit {
+        let fit = Fit {
             form: from.form,
             point,
             noise: objective.noise,
             deviance,
-            criterion,
-        })
+            criterion: 0.0,
+        };
+        let criterion = self.criterion(&fit);
+        Some(Fit { criterion, ..fit })
     }
 
     pub fn outputs(&self) -> usize {
@@ -122,9 +165,9 @@ impl<'a> Study<'a> {
 
     /// Covariance of the free numbers.
     pub fn covariance(&self, fit: &Fit) -> DMatrix<f64> {
-        Deviance::new(&self.problem, fit.form, fit.noise.clone())
-            .covariances(&fit.point)
-            .joint
+        let covariances =
+            Deviance::new(&self.problem, fit.form, fit.noise.clone()).covariances(&fit.point);
+        covariances.joint / self.information
     }
 
     /// Parameters and initial states of each recording.
@@ -161,6 +204,12 @@ impl<'a> Study<'a> {
         let numbers = self.problem.nominal().len();
         Deviance::new(&self.problem, Form::FreeRun, fit.noise.clone())
             .simulated(&fit.point[..numbers])
+    }
+
+    /// Whether what a fit leaves of each output is smaller than its spread about its mean.
+    pub fn follows(&self, fit: &Fit) -> bool {
+        self.residual(fit)
+            .is_some_and(|residual| follows(&self.problem, &residual))
     }
 
     /// The plant.

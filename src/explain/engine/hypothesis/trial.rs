@@ -105,7 +105,7 @@ impl Hypothesis {
             .collect::<Vec<_>>()
             .into_par_iter()
             .filter_map(|(o, from, made)| {
-                let study = Study::new(&made.plant, ground.recordings, &options).ok()?;
+                let study = ground.study.of(&made.plant, &options).ok()?;
                 let start = made.from(from, parameters, states, outputs);
                 let fit = study.refit(&start, 0, GLANCE)?;
                 Some((o, from.deviance - fit.deviance, made, fit))
@@ -119,7 +119,7 @@ impl Hypothesis {
         let best = chosen
             .into_par_iter()
             .filter_map(|(_, _, made, from)| {
-                let study = Study::new(&made.plant, ground.recordings, &options).ok()?;
+                let study = ground.study.of(&made.plant, &options).ok()?;
                 let mut from = from.clone();
                 if from.form != ground.fit.form {
                     // From free run to the observer of the fit before.

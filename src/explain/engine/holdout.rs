@@ -1,0 +1,207 @@
+//! How well free runs follow the recordings in blocks that their fit has not seen.
+
+use rayon::prelude::*;
+
+use super::search::MOST_STEPS;
+use crate::noise::Series;
+use crate::physics::estimate::{Effort, EstimateOptions, Fit, Form, PlantRecording, Study};
+use crate::physics::{Hold, Plant};
+
+/// Blocks that each recording is cut into; each is left out once. Few and long: over a short run a wrong plant is saved by its
+/// initial state.
+const BLOCKS: usize = 3;
+/// Effort of a fit from that to all of the recordings.
+const AGAIN: Effort = Effort {
+    iterations: 12,
+    settled: 0.1,
+    attempts: 6,
+};
+
+/// What parameters are estimated by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Estimator {
+    /// Maximum likelihood, in the form and with the noise of the search.
+    Likelihood,
+    /// Least squares of the free run.
+    FreeRun,
+}
+
+/// Errors of free runs in blocks that were left out.
+#[derive(Debug, Clone)]
+pub(crate) struct HeldOut {
+    /// Mean square of each output.
+    pub squares: Vec<f64>,
+    /// Variance of each output.
+    pub variances: Vec<f64>,
+}
+
+impl HeldOut {
+    /// Error over that of another, the geometric mean over outputs.
+    pub fn over(&self, other: &Self) -> f64 {
+        ratio(&self.squares, &other.squares)
+    }
+
+    /// Root of the mean square of an output, and how much of its standard deviation it is short of, in percent.
+    pub fn figure(&self, output: usize) -> (f64, f64) {
+        let (square, variance) = (self.squares[output], self.variances[output]);
+        let part = (square / variance.max(f64::MIN_POSITIVE)).sqrt();
+        (square.sqrt(), 100.0 * (1.0 - part))
+    }
+
+    /// The part of the mean square of another that is gone, the geometric mean over outputs.
+    pub fn removed(&self, other: &Self) -> f64 {
+        1.0 - self.over(other).powi(2)
+    }
+
+    /// Whether free runs follow the recordings better than their means do.
+    pub fn follows(&self) -> bool {
+        ratio(&self.squares, &self.variances) < 1.0
+    }
+}
+
+fn ratio(a: &[f64], b: &[f64]) -> f64 {
+    let logs = a
+        .iter()
+        .zip(b)
+        .map(|(a, b)| 0.5 * (a.max(1e-300) / b.max(1e-300)).ln());
+    (logs.sum::<f64>() / a.len().max(1) as f64).exp()
+}
+
+/// Samples of a recording that a fold leaves out.
+fn block(samples: usize, fold: usize) -> std::ops::Range<usize> {
+    samples * fold / BLOCKS..samples * (fold + 1) / BLOCKS
+}
+
+/// The blocks of a recording, from and to, in seconds.
+pub(crate) fn blocks(recording: &PlantRecording) -> Vec<[f64; 2]> {
+    let samples = recording.outputs.first().map_or(0, Vec::len);
+    let at = |k: usize| recording.start_time + k as f64 * recording.sample_time;
+    (0..BLOCKS)
+        .map(|fold| block(samples, fold))
+        .map(|b| [at(b.start), at(b.end)])
+        .collect()
+}
+
+fn cut(recording: &PlantRecording, range: std::ops::Range<usize>) -> PlantRecording {
+    let part = |columns: &[Vec<f64>]| columns.iter().map(|c| c[range.clone()].to_vec()).collect();
+    PlantRecording {
+        inputs: part(&recording.inputs),
+        outputs: part(&recording.outputs),
+        start_time: recording.start_time + range.start as f64 * recording.sample_time,
+        ..*recording
+    }
+}
+
+/// The plant with every initial state free: a block does not begin where the recording does.
+fn released(plant: &Plant) -> Plant {
+    let mut spec = plant.spec.clone();
+    for state in spec.states() {
+        spec.variables[state.index()].fixed = false;
+    }
+    Plant::new(spec).with_most_steps(MOST_STEPS)
+}
+
+/// Options under which every parameter is free.
+pub(super) fn all_free(plant: &Plant, hold: Hold, estimator: Estimator) -> EstimateOptions {
+    EstimateOptions {
+        free: vec![true; plant.spec.parameters().len()],
+        hold,
+        form: None,
+        least_squares: estimator == Estimator::FreeRun,
+    }
+}
+
+/// Leaves out one block after the other.
+pub(super) fn held_out(
+    plant: &Plant,
+    fit: &Fit,
+    estimator: Estimator,
+    recordings: &[PlantRecording],
+    hold: Hold,
+) -> Option<HeldOut> {
+    let options = all_free(plant, hold, estimator);
+    let study = Study::new(plant, recordings, &options).ok()?;
+    let states: Vec<Vec<Vec<f64>>> = study
+        .trajectories(fit)?
+        .into_iter()
+        .map(|t| t.states)
+        .collect();
+    let released = released(plant);
+    let at = |r: usize, k: usize| states[r].iter().map(move |x| x[k]);
+    let outputs = study.outputs();
+    let parameters = study.parameters();
+    let gains = match fit.form {
+        Form::Innovation => &fit.point[fit.point.len() - states[0].len() * outputs..],
+        Form::FreeRun => &[][..],
+    };
+    let folds: Option<Vec<Series>> = (0..BLOCKS)
+        .into_par_iter()
+        .map(|fold| {
+            let (mut kept, mut kept_start) = (Vec::new(), Vec::new());
+            let (mut left_out, mut left_out_start) = (Vec::new(), Vec::new());
+            for (r, recording) in recordings.iter().enumerate() {
+                let samples = recording.outputs.first()?.len();
+                let out = block(samples, fold);
+                for range in [0..out.start, out.end..samples] {
+                    if range.len() > 0 {
+                        kept_start.extend(at(r, range.start));
+                        kept.push(cut(recording, range));
+                    }
+                }
+                left_out_start.extend(at(r, out.start));
+                left_out.push(cut(recording, out));
+            }
+            let training = Study::new(&released, &kept, &options).ok()?;
+            let mut point = fit.point[..parameters].to_vec();
+            point.extend(kept_start);
+            let again = match estimator {
+                Estimator::FreeRun => training.least_squares(&point)?,
+                Estimator::Likelihood => {
+                    point.extend(gains);
+                    let from = Fit {
+                        point,
+                        ..fit.clone()
+                    };
+                    training.refit(&from, 1, AGAIN)?
+                }
+            };
+            let fitted = released.with_values(&again.point[..parameters]);
+            let of_states = EstimateOptions {
+                free: vec![false; parameters],
+                least_squares: true,
+                ..options.clone()
+            };
+            let test = Study::new(&fitted, &left_out, &of_states).ok()?;
+            let run = test.least_squares(&left_out_start)?;
+            test.residual(&run)
+        })
+        .collect();
+    let folds = folds?;
+    let of_output = |o: usize, series: &Series, less: f64| -> (f64, f64) {
+        let each = series.iter().skip(o).step_by(outputs).flatten();
+        each.filter(|e| e.is_finite())
+            .fold((0.0, 0.0), |(s, n), e| (s + (e - less).powi(2), n + 1.0))
+    };
+    let recorded: Series = recordings.iter().flat_map(|r| r.outputs.clone()).collect();
+    let (mut squares, mut variances) = (Vec::new(), Vec::new());
+    for o in 0..outputs {
+        let each = folds.iter().map(|f| of_output(o, f, 0.0));
+        let (sum, count) = each.fold((0.0, 0.0), |(s, n), (a, b)| (s + a, n + b));
+        squares.push(sum / count);
+        let known: Vec<f64> = recorded
+            .iter()
+            .skip(o)
+            .step_by(outputs)
+            .flatten()
+            .copied()
+            .filter(|y| y.is_finite())
+            .collect();
+        let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
+        let (sum, count) = of_output(o, &recorded, mean);
+        variances.push(sum / count);
+    }
+    squares
+        .iter()
+        .all(|s| s.is_finite())
+        .then_some(HeldOut { squares, variances })
+}

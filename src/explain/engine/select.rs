@@ -1,0 +1,210 @@
+//! Which answer to give: likelihood searches, and free runs over data that no fit has seen decide whether it may be believed.
+//!
+//! A likelihood is right where its noise model is. Of a real plant every model leaves more out than noise, and the noise
+//! model or the observer then takes over physics: what predicts the next sample best may simulate worse than before. So every
+//! answer, and the plant without it, is fitted to a part of the data and simulated over the rest; where the likelihood's
+//! answer leaves structure behind or simulates worse, the same search is made for the free run by least squares.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::holdout::{Estimator, HeldOut, all_free, held_out};
+use super::scope::Scope;
+use super::search::{Found, MOST_STEPS, Objective, chance, search};
+use crate::physics::estimate::{EstimateError, Fit, Form, PlantRecording, Study};
+use crate::physics::{Hold, Plant};
+
+/// Free runs whose errors differ by less than this part are equally good (the tolerance of the project's score
+/// on real recordings).
+const EQUAL: f64 = 0.02;
+/// Level of the test that asks whether maximum likelihood and least squares differ by more than chance allows.
+const MISSPECIFIED: f64 = 0.05;
+/// Probability by chance below which the strongest score test says that something is left.
+pub(crate) const CHANCE: f64 = 1e-9;
+
+/// A plant with some of the effects of a search, fitted in one of the ways.
+struct Rival {
+    /// Which search, and how many of its effects.
+    search: usize,
+    accepted: usize,
+    estimator: Estimator,
+    fit: Fit,
+    held_out: HeldOut,
+    /// Its free run is worse than that of least squares by more than the noise allows.
+    misspecified: bool,
+}
+
+/// What the equations leave out.
+///
+/// # Errors
+/// As those of an estimation.
+pub(crate) fn select(
+    plant: &Plant,
+    recordings: &[PlantRecording],
+    hold: Hold,
+    scope: &Scope,
+) -> Result<Found, EstimateError> {
+    let likely = search(plant, recordings, hold, scope, Objective::Likelihood)?;
+    let mut rivals = rivals(&likely, 0, 0, recordings, hold);
+    let Some(without) = best(&rivals, |r| r.accepted == 0) else {
+        return Ok(likely);
+    };
+    let whole = best(&rivals, |r| r.accepted == likely.accepted);
+    let holds = whole.is_some_and(|w| w.held_out.over(&without.held_out) <= 1.0 + EQUAL);
+    let adequate = chance(likely.left().0) * likely.left().1 as f64 >= CHANCE;
+    let mut searches = vec![likely];
+    // An unstable plant does not run freely: its likelihood has no judge.
+    let judged = rivals.iter().any(|r| r.held_out.follows());
+    let mut chosen = (0, searches[0].accepted);
+    // With an observer the residuals are white wherever the observer follows: that proves no effect.
+    let proved = adequate && (searches[0].accepted == 0 || searches[0].fit.form == Form::FreeRun);
+    if judged && !(holds && proved) {
+        if let Ok(found) = search(plant, recordings, hold, scope, Objective::FreeRun) {
+            rivals.extend(self::rivals(&found, 1, 1, recordings, hold));
+            searches.push(found);
+        }
+        if let Some(winner) = winner(&rivals) {
+            chosen = winner;
+        }
+    }
+    let (which, accepted) = chosen;
+    let fitted = |accepted: usize| {
+        let own = |r: &&Rival| r.accepted == accepted && (accepted == 0 || r.search == which);
+        trusted(&rivals.iter().filter(own).collect::<Vec<_>>(), judged)
+    };
+    let (baseline, last) = (fitted(0), fitted(accepted));
+    let mut found = searches.swap_remove(which);
+    found.keep(accepted);
+    if let Some(without) = baseline {
+        found.baseline = without.fit.clone();
+    }
+    if let Some(with) = last {
+        found.options.least_squares = with.estimator == Estimator::FreeRun;
+        found.fit = with.fit.clone();
+        found.information = information(&found, recordings).unwrap_or(1.0);
+        if judged && let Some(without) = baseline {
+            found.held_out = Some([without.held_out.clone(), with.held_out.clone()]);
+        }
+    }
+    Ok(found)
+}
+
+/// Of the fits of one plant the likelihood's, whose standard deviations hold, unless it simulates worse, in blocks left out or
+/// by more than its noise allows.
+fn trusted<'a>(rivals: &[&'a Rival], judged: bool) -> Option<&'a Rival> {
+    let least = *rivals.iter().min_by(|a, b| order(a, b))?;
+    let likelihood = |r: &&&Rival| {
+        r.estimator == Estimator::Likelihood
+            && (!judged || r.held_out.over(&least.held_out) <= 1.0 + EQUAL && !r.misspecified)
+    };
+    let free_run = || rivals.iter().find(|r| r.estimator == Estimator::FreeRun);
+    let chosen = rivals.iter().find(likelihood).or_else(free_run);
+    Some(chosen.copied().unwrap_or(least))
+}
+
+/// Information in a value of what the final fit leaves.
+fn information(found: &Found, recordings: &[PlantRecording]) -> Option<f64> {
+    if !found.options.least_squares {
+        return Some(1.0);
+    }
+    let study = Study::new(&found.plant, recordings, &found.options).ok()?;
+    study.effective_share(&found.fit)
+}
+
+fn order(a: &Rival, b: &Rival) -> std::cmp::Ordering {
+    a.held_out.over(&b.held_out).total_cmp(&1.0)
+}
+
+fn best(rivals: &[Rival], which: impl Fn(&Rival) -> bool) -> Option<&Rival> {
+    rivals
+        .iter()
+        .filter(|r| which(r))
+        .min_by(|a, b| order(a, b))
+}
+
+/// The search and the number of effects whose free runs follow best; of equals the one with fewer effects.
+fn winner(rivals: &[Rival]) -> Option<(usize, usize)> {
+    let best = best(rivals, |_| true)?;
+    let equal = |r: &&Rival| r.held_out.over(&best.held_out) <= 1.0 + EQUAL;
+    let fewest = rivals.iter().filter(equal).map(|r| r.accepted).min()?;
+    let chosen = rivals
+        .iter()
+        .filter(equal)
+        .filter(|r| r.accepted == fewest)
+        .min_by(|a, b| order(a, b))?;
+    Some((chosen.search, chosen.accepted))
+}
+
+/// Every number of effects of a search from `fewest`, by both estimators.
+fn rivals(
+    found: &Found,
+    search: usize,
+    fewest: usize,
+    recordings: &[PlantRecording],
+    hold: Hold,
+) -> Vec<Rival> {
+    let mut all = Vec::new();
+    for accepted in fewest..=found.accepted {
+        let (plant, fit) = found.stage(accepted);
+        let of_search = match found.options.least_squares {
+            true => Estimator::FreeRun,
+            false => Estimator::Likelihood,
+        };
+        let mut fits = vec![(of_search, fit.clone(), false)];
+        if of_search == Estimator::Likelihood
+            && let Some((least_squares, misspecified)) =
+                by_least_squares(plant, fit, recordings, hold)
+        {
+            fits[0].2 = misspecified;
+            fits.push((Estimator::FreeRun, least_squares, false));
+        }
+        for (estimator, fit, misspecified) in fits {
+            let Some(held_out) = held_out(plant, &fit, estimator, recordings, hold) else {
+                continue;
+            };
+            all.push(Rival {
+                search,
+                accepted,
+                estimator,
+                fit,
+                held_out,
+                misspecified,
+            });
+        }
+    }
+    all
+}
+
+/// The least squares fit of the free run, and whether the likelihood's is worse by more than two estimates of the same
+/// parameters can differ (J. A. Hausman, *Econometrica* 46, 1978: where both are consistent, the excess of the sum of squares
+/// over its minimum, in units of the noise, is at most chi-square with a degree of freedom for each parameter).
+fn by_least_squares(
+    plant: &Plant,
+    likelihood: &Fit,
+    recordings: &[PlantRecording],
+    hold: Hold,
+) -> Option<(Fit, bool)> {
+    let options = all_free(plant, hold, Estimator::FreeRun);
+    let limited = plant.clone().with_most_steps(MOST_STEPS);
+    let study = Study::new(&limited, recordings, &options).ok()?;
+    let least_squares = study.least_squares(&likelihood.point)?;
+    if !study.follows(&least_squares) {
+        return None;
+    }
+    let numbers = least_squares.point.len();
+    let at = |point: &[f64]| Fit {
+        form: Form::FreeRun,
+        point: point[..numbers].to_vec(),
+        ..least_squares.clone()
+    };
+    let square = |fit: &Fit| -> Option<f64> {
+        let whitened = fit.noise.whiten_kept(&study.residual(fit)?, study.mask());
+        Some(whitened.iter().map(|e| e * e).sum())
+    };
+    let excess = square(&at(&likelihood.point))? - square(&least_squares)?;
+    let share = study.effective_share(&least_squares)?;
+    let law = ChiSquared::new(numbers as f64).ok()?;
+    Some((
+        least_squares,
+        law.sf(share * excess.max(0.0)) < MISSPECIFIED,
+    ))
+}
