@@ -199,3 +199,75 @@ impl Candidate {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::super::argument::arguments;
+    use super::super::edit::{places, sensors};
+    use super::super::library::{Needs, TERMS};
+    use super::super::values::grid;
+    use super::*;
+    use crate::physics::parse;
+
+    #[test]
+    fn every_term_of_the_library_makes_a_plant_with_names_of_its_own() {
+        let text = "model Motor
+               parameter Real R(unit=\"Ohm\") = 1; parameter Real J = 1;
+               input Real u(unit=\"V\"); input Real d(unit=\"K\"); output Real y(unit=\"rad\");
+               Real phi(unit=\"rad\"); Real w(unit=\"rad/s\"); Real T(unit=\"K\");
+             equation
+               der(phi) = w; J*der(w) = u/R - w; der(T) = u*w - (T - d); y = phi;
+             end Motor;";
+        let spec = parse(text).unwrap();
+        let wave = |k: usize| (0.3 * k as f64).sin();
+        let recordings = [PlantRecording {
+            inputs: vec![(0..200).map(wave).collect(); 2],
+            outputs: vec![(0..200).map(wave).collect()],
+            sample_time: 0.1,
+            start_time: 0.0,
+        }];
+        let mut arguments = arguments(&spec);
+        for argument in &mut arguments {
+            argument.set(vec![(0..200).map(wave).collect()]);
+        }
+        let mut made = BTreeSet::new();
+        for term in TERMS {
+            let mut at: Vec<Place> = match term.port {
+                Port::Sensor => sensors(&spec).into_iter().map(Place::Equation).collect(),
+                _ => places(&spec, usize::MAX),
+            };
+            at.retain(|place| match term.port {
+                Port::Equation | Port::Sensor => matches!(place, Place::Equation(_)),
+                Port::Input => matches!(place, Place::Input(_)),
+                Port::Parameter => matches!(place, Place::Parameter(_)),
+            });
+            let own: Vec<Option<usize>> = match term.needs {
+                Needs::Time => vec![None],
+                _ => (0..arguments.len())
+                    .filter(|&a| arguments[a].serves(term.needs))
+                    .map(Some)
+                    .collect(),
+            };
+            for (place, argument) in at.iter().flat_map(|p| own.iter().map(move |a| (*p, *a))) {
+                for shapes in grid(term, argument.map(|a| &arguments[a]), &recordings) {
+                    let lead = Lead {
+                        sensor: term.port == Port::Sensor,
+                        argument,
+                        strength: 0.1,
+                        shapes,
+                        ..Lead::untested(term, place)
+                    };
+                    if let Some(candidate) = candidate(&spec, &lead, &arguments, &recordings) {
+                        let names: BTreeSet<&String> = candidate.names.iter().collect();
+                        assert_eq!(names.len(), candidate.names.len(), "{names:?}");
+                        made.insert(term.id);
+                    }
+                }
+            }
+        }
+        let all: BTreeSet<&str> = TERMS.iter().map(|t| t.id).collect();
+        assert_eq!(made, all);
+    }
+}

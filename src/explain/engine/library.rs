@@ -80,7 +80,7 @@ pub(crate) const MEMORIES: [&str; 2] = ["{m}", "{p}"];
 /// A number that shapes a term.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Shape {
-    /// As in the form: `c` for `{c}`.
+    /// As in the form: `from` for `{from}`. Not the symbol of the strength.
     pub symbol: &'static str,
     pub starts: Starts,
     /// True when only positive values make sense.
@@ -134,8 +134,8 @@ const fn curve(
     }
 }
 
-const ABOVE: &[f64] = &[0.5, 0.7, 0.85, 0.95];
-const BELOW: &[f64] = &[0.5, 0.3, 0.15, 0.05];
+const ABOVE: &[f64] = &[0.5, 0.7, 0.85, 0.94, 0.98];
+const BELOW: &[f64] = &[0.5, 0.3, 0.15, 0.06, 0.02];
 const TIMES: &[f64] = &[
     0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85,
     0.9, 0.95,
@@ -191,34 +191,30 @@ pub(crate) const TERMS: &[Term] = &[
         "above",
         Equation,
         Anything,
-        "max({z} - {c}, 0)",
-        &[shape("c", Starts::Quantiles(ABOVE), false)],
+        "max({z} - {from}, 0)",
+        &[shape("from", Starts::Quantiles(ABOVE), false)],
     ),
     curve(
         "below",
         Equation,
         Anything,
-        "min({z} - {c}, 0)",
-        &[shape("c", Starts::Quantiles(BELOW), false)],
+        "min({z} - {from}, 0)",
+        &[shape("from", Starts::Quantiles(BELOW), false)],
     ),
     curve(
         "both_sides",
         Equation,
         BothSigns,
-        "max({z} - {c}, 0) + min({z} + {c}, 0)",
-        &[shape(
-            "c",
-            Starts::SizeQuantiles(&[0.5, 0.7, 0.85, 0.95]),
-            true,
-        )],
+        "max({z} - {from}, 0) + min({z} + {from}, 0)",
+        &[shape("from", Starts::SizeQuantiles(ABOVE), true)],
     ),
     curve(
         "root_above",
         Equation,
         Anything,
-        "sqrt(max({z} - {c}, 0))",
+        "sqrt(max({z} - {from}, 0))",
         &[shape(
-            "c",
+            "from",
             Starts::Quantiles(&[0.3, 0.5, 0.7, 0.85, 0.95]),
             false,
         )],

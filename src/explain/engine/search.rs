@@ -307,6 +307,17 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
     {
         tried.push((s, white));
     }
+    // Heavy tails discount what is rare and large, such as the contact with an end stop, and an observer recovers from it: the
+    // same again where every value counts.
+    if !nothing_left
+        && fit.form == Form::Innovation
+        && fit.noise.degrees.is_finite()
+        && let Some(gaussian) = study.gaussian(fit)
+        && let Some(s) = screen(study, &gaussian, own, recordings)
+        && chance(s.leads.first().map_or(0.0, |l| l.statistic)) * s.tests as f64 <= LEFT
+    {
+        tried.push((s, gaussian));
+    }
     // Where there is no free run to look at, what no test finds is what a candidate does to the observer.
     if tried.len() == 1 && insignificant && !options.least_squares {
         tried[0].0.leads.clear();

@@ -95,6 +95,17 @@ impl<'a> Study<'a> {
         Some(Fit { criterion, ..fit })
     }
 
+    /// The same numbers under Gaussian noise of the size of the residual, where every value counts as much as any other.
+    pub fn gaussian(&self, fit: &Fit) -> Option<Fit> {
+        let residual = self.residual(fit)?;
+        let noise = Noise::white(&residual, self.outputs(), self.mask());
+        Some(Fit {
+            deviance: noise.deviance(&residual, self.mask()),
+            noise,
+            ..fit.clone()
+        })
+    }
+
     /// A fit from a point with the noise of another, and then `rounds` times with a noise model of its own.
     pub fn refit(&self, from: &Fit, rounds: usize, effort: Effort) -> Option<Fit> {
         let mut point = from.point.clone();
