@@ -126,6 +126,7 @@ impl Argument {
             Needs::Radiation => self.form == ArgumentForm::Radiation,
             Needs::Difference => self.form == ArgumentForm::Difference,
             Needs::Angle => self.angle && self.range() > std::f64::consts::PI,
+            Needs::OwnState => self.form == ArgumentForm::Variable && !self.held,
             Needs::Time => false,
         }
     }

@@ -13,6 +13,8 @@ const LEAST_SAMPLES: f64 = 0.1;
 /// Narrowest width, as a part of the argument's standard deviation.
 const LEAST_SPREAD: f64 = 1e-3;
 
+/// Least and most part of a whole.
+const LEAST_SHARE: (f64, f64) = (0.001, 0.95);
 /// Least yield of bristles, as a part of the value that is started from.
 const LEAST_YIELD: f64 = 0.05;
 
@@ -68,6 +70,7 @@ pub(crate) fn candidate(
                 LEAST_SPREAD * argument.map_or(0.0, Argument::spread),
                 f64::INFINITY,
             ),
+            Starts::Share(_) => LEAST_SHARE,
             Starts::Travel(_) => (LEAST_YIELD * value, f64::INFINITY),
             _ if shape.positive => (1e-3 * value, f64::INFINITY),
             _ => (f64::NEG_INFINITY, f64::INFINITY),
@@ -94,7 +97,19 @@ pub(crate) fn candidate(
             _ => free_name(spec, &format!("{}_state_{i}", term.id)),
         })
         .collect();
-    let body = filled(term.form, term, &text, &memories, &shapes, h);
+    let factor = match lead.place {
+        Place::Equation(at) => spec.equations[at].coefficient,
+        _ => None,
+    };
+    let factor = factor.map_or_else(
+        || "1.0".to_owned(),
+        |id| {
+            let span = spec.expressions.span(id);
+            format!("({})", &spec.text[span.start..span.end])
+        },
+    );
+    let body =
+        filled(term.form, term, &text, &memories, &shapes, h).replace("{a}", &factor);
     for (memory, name) in term.memories.iter().zip(&memories) {
         let first = memory.start.at(argument.map_or(0.0, |a| a.values[0][0]));
         let source = if lead.sensor {

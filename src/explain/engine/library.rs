@@ -28,6 +28,8 @@ pub(crate) enum Needs {
     Difference,
     /// An angle that covers half a turn or more.
     Angle,
+    /// The state whose derivative the equation determines.
+    OwnState,
     /// No argument: a function of time alone.
     Time,
 }
@@ -53,6 +55,10 @@ pub(crate) enum Starts {
     Samples(&'static [f64]),
     /// As they stand.
     Values(&'static [f64]),
+    /// Parts of a whole.
+    Share(&'static [f64]),
+    /// What the integral of the argument moves in a sample at a typical size of it.
+    Moved(&'static [f64]),
 }
 
 /// Where a memory starts.
@@ -94,7 +100,8 @@ pub(crate) struct Term {
     pub id: &'static str,
     pub port: Port,
     pub needs: Needs,
-    /// Function of `{z}`, of the shapes, and of the memories; the strength is its factor.
+    /// Function of `{z}`, of the shapes, and of the memories; the strength is its factor. `{v}` is what stands at the place,
+    /// `{a}` the factor of the derivative there.
     pub form: &'static str,
     pub memories: &'static [Memory],
     pub shapes: &'static [Shape],
@@ -141,7 +148,7 @@ const TIMES: &[f64] = &[
     0.9, 0.95,
 ];
 
-use Needs::{Angle, Anything, BothSigns, Difference, Positive, Radiation, Time};
+use Needs::{Angle, Anything, BothSigns, Difference, OwnState, Positive, Radiation, Time};
 use Port::{Equation, Input, Parameter, Sensor};
 
 /// A function that nobody listed: its text is that of its pieces.
@@ -165,9 +172,10 @@ pub(crate) const TERMS: &[Term] = &[
         "stribeck",
         Equation,
         BothSigns,
-        "tanh({z}/{w})*exp(-abs({z})/{vs})",
+        "tanh({z}/{w})*(1 + {r}*exp(-abs({z})/{vs}))",
         &[
             shape("w", Starts::Spread(&[0.02]), true),
+            shape("r", Starts::Values(&[0.7]), true),
             shape("vs", Starts::Spread(&[0.1, 0.3, 0.8]), true),
         ],
     ),
@@ -184,6 +192,95 @@ pub(crate) const TERMS: &[Term] = &[
         shapes: &[shape("s", Starts::Travel(&[0.003, 0.02, 0.1, 0.4]), true)],
         free_strength: true,
         symbol: "c",
+        units: &[],
+    },
+    // ... and that hold more at rest than they do moving: C. Canudas de Wit et al., IEEE Trans. Automatic Control 40, 1995.
+    Term {
+        id: "stribeck_bristles",
+        port: Equation,
+        needs: BothSigns,
+        form: "{m}",
+        memories: &[Memory {
+            rate: "({z} - abs({z})*{m}/(1 + {r}*exp(-abs({z})/{vs})))/{s}",
+            start: MemoryStart::Zero,
+        }],
+        shapes: &[
+            shape("s", Starts::Travel(&[0.003]), true),
+            shape("r", Starts::Values(&[0.7]), true),
+            shape("vs", Starts::Spread(&[0.1, 0.4]), true),
+        ],
+        free_strength: true,
+        symbol: "c",
+        units: &[],
+    },
+    // A part `f` of what the equation's coefficient holds (inertia, heat capacity) is coupled to the rest by a spring and a
+    // damper: J*der(z) = v becomes (1 - f)*J*der(z) = v - force, where {a} is J and {p} the speed of that part.
+    Term {
+        id: "extra_mode",
+        port: Equation,
+        needs: OwnState,
+        form: "{f}/(1 - {f})*({v} - {a}*({m}/{T}^2 + {D}*({z} - {p})/{T}))",
+        memories: &[
+            Memory {
+                rate: "{z} - {p}",
+                start: MemoryStart::Zero,
+            },
+            Memory {
+                rate: "{m}/{T}^2 + {D}*({z} - {p})/{T}",
+                start: MemoryStart::Argument,
+            },
+        ],
+        shapes: &[
+            shape("f", Starts::Share(&[0.3]), true),
+            shape("T", Starts::Samples(&[1.0, 3.0, 10.0, 30.0]), true),
+            shape("D", Starts::Values(&[0.1]), true),
+        ],
+        free_strength: false,
+        symbol: "",
+        units: &[],
+    },
+    // ... by a resistance alone.
+    Term {
+        id: "extra_mode",
+        port: Equation,
+        needs: OwnState,
+        form: "{f}/(1 - {f})*({v} - {a}*({z} - {m})/{T})",
+        memories: &[Memory {
+            rate: "({z} - {m})/{T}",
+            start: MemoryStart::Argument,
+        }],
+        shapes: &[
+            shape("f", Starts::Share(&[0.3]), true),
+            shape("T", Starts::Samples(&[3.0, 10.0, 30.0, 100.0, 300.0]), true),
+        ],
+        free_strength: false,
+        symbol: "",
+        units: &[],
+    },
+    // ... by a stiff spring with play `g`.
+    Term {
+        id: "backlash",
+        port: Equation,
+        needs: OwnState,
+        form: "{f}/(1 - {f})*({v} - {a}*((max({m} - {g}, 0) + min({m} + {g}, 0))/{T}^2 + {D}*({z} - {p})/{T}))",
+        memories: &[
+            Memory {
+                rate: "{z} - {p}",
+                start: MemoryStart::Zero,
+            },
+            Memory {
+                rate: "(max({m} - {g}, 0) + min({m} + {g}, 0))/{T}^2 + {D}*({z} - {p})/{T}",
+                start: MemoryStart::Argument,
+            },
+        ],
+        shapes: &[
+            shape("f", Starts::Share(&[0.3]), true),
+            shape("T", Starts::Samples(&[1.0]), true),
+            shape("D", Starts::Values(&[0.1]), true),
+            shape("g", Starts::Moved(&[0.3, 1.0, 3.0, 10.0]), true),
+        ],
+        free_strength: false,
+        symbol: "",
         units: &[],
     },
     curve("one_sided", Equation, BothSigns, "max({z}, 0)", &[]),

@@ -132,7 +132,9 @@ pub(crate) fn called(
         }
         (Port::Equation, "friction") if what == Kind::Velocity => "coulomb_friction",
         (Port::Equation, "stribeck") if what == Kind::Velocity => "stribeck_friction",
-        (Port::Equation, "bristles") => "hysteresis",
+        (Port::Equation, "stribeck_bristles") if what == Kind::Velocity => "stribeck_friction",
+        (Port::Equation, "bristles" | "stribeck_bristles") => "hysteresis",
+        (Port::Equation, id @ ("extra_mode" | "backlash")) => id,
         (Port::Equation, "one_sided") if what == Kind::Velocity => "asymmetric_damping",
         (Port::Equation, "above" | "below" | "both_sides") => match what {
             Kind::Position => "end_stop",

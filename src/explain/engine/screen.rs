@@ -15,7 +15,7 @@ use super::projection::{Projection, SIGNATURE};
 use super::values::{Instance, evaluate, grid};
 use crate::noise::Series;
 use crate::physics::estimate::{Fit, PlantRecording, Study};
-use crate::physics::{ModelSpec, Node, VariableId};
+use crate::physics::{ModelSpec, Node, Unknown, VariableId};
 
 /// Numbers of columns that are evaluated in one plant; those with a memory one by one, each in steps of its own.
 const BATCH: usize = 64;
@@ -215,6 +215,13 @@ pub(crate) fn screen(
                     port => {
                         for (place, &column) in hooked.places.iter().zip(&hooked.columns) {
                             let fits = match (*place, port) {
+                                (Place::Equation(at), Port::Equation)
+                                    if instance.term.needs == Needs::OwnState =>
+                                {
+                                    let own = spec.equations[at].unknown;
+                                    argument
+                                        .is_some_and(|a| own == Unknown::Derivative(a.variables[0]))
+                                }
                                 (Place::Equation(at), Port::Equation) => {
                                     argument.is_none_or(|a| a.known_after.is_none_or(|k| k < at))
                                 }

@@ -181,8 +181,12 @@ fn searched(lead: &Lead, recordings: &[PlantRecording]) -> f64 {
             Starts::Length(_) => 2.0 * (samples / 20.0).ln(),
             Starts::Waves(_) => 7.0,
             Starts::Quantiles(_) | Starts::SizeQuantiles(_) => 2.5,
-            Starts::Spread(_) | Starts::Samples(_) | Starts::Travel(_) | Starts::Rate(_) => 2.0,
-            Starts::Values(_) => 0.0,
+            Starts::Spread(_)
+            | Starts::Samples(_)
+            | Starts::Travel(_)
+            | Starts::Moved(_)
+            | Starts::Rate(_) => 2.0,
+            Starts::Values(_) | Starts::Share(_) => 0.0,
         })
         .sum()
 }

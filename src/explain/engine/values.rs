@@ -35,7 +35,8 @@ fn starts(shape: Starts, argument: Option<&Argument>, recordings: &[PlantRecordi
             .map(|p| begin + p * samples as f64 * h)
             .collect(),
         Starts::Samples(counts) => counts.iter().map(|c| c * h).collect(),
-        Starts::Values(values) => values.to_vec(),
+        Starts::Moved(counts) => of(counts, &|a, n| n * a.spread() * h),
+        Starts::Values(values) | Starts::Share(values) => values.to_vec(),
     }
 }
 
@@ -122,7 +123,12 @@ pub(super) fn evaluate(
             let memories: Vec<String> = (0..instance.term.memories.len())
                 .map(|j| format!("m{i}_{j}"))
                 .collect();
-            let fill = |form: &str| filled(form, instance.term, &name, &memories, &shapes, h);
+            // What stands at the place is what parameters scale, and a size of the term does not matter here.
+            let fill = |form: &str| {
+                filled(form, instance.term, &name, &memories, &shapes, h)
+                    .replace("{v}", "0.0")
+                    .replace("{a}", "1.0")
+            };
             text.push_str(&format!("output Real b{i};\n"));
             equations.push_str(&format!("b{i} = {};\n", fill(instance.term.form)));
             for (memory, name) in instance.term.memories.iter().zip(&memories) {
