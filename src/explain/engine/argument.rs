@@ -3,6 +3,7 @@
 use crate::physics::{ModelSpec, VariableId, VariableKind};
 
 use super::library::Needs;
+use super::names::is_velocity;
 
 /// How an argument is made of variables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,6 +25,7 @@ pub(crate) struct Argument {
     pub known_after: Option<usize>,
     pub form: ArgumentForm,
     pub angle: bool,
+    pub velocity: bool,
     /// Changes at samples only: it is made of inputs.
     pub held: bool,
     /// Values along each recording.
@@ -53,6 +55,7 @@ impl Argument {
             .all(|&v| spec.variable(v).kind == VariableKind::Input);
         Self {
             form: ArgumentForm::Variable,
+            velocity: is_velocity(spec, &variables),
             angle: variables.len() == 1 && unit(variables[0]) == "rad",
             held,
             expression,
@@ -125,7 +128,8 @@ impl Argument {
             Needs::Positive => self.quantile(0.0) >= 0.0,
             Needs::Radiation => self.form == ArgumentForm::Radiation,
             Needs::Difference => self.form == ArgumentForm::Difference,
-            Needs::Angle => self.angle && self.range() > std::f64::consts::PI,
+            Needs::Angle => self.angle,
+            Needs::Velocity => both && self.velocity,
             Needs::OwnState => self.form == ArgumentForm::Variable && !self.held,
             Needs::Time => false,
         }

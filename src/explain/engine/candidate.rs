@@ -251,7 +251,7 @@ mod tests {
         for term in TERMS {
             let mut at: Vec<Place> = match term.port {
                 Port::Sensor => sensors(&spec).into_iter().map(Place::Equation).collect(),
-                _ => places(&spec, usize::MAX),
+                _ => places(&spec, &spec),
             };
             at.retain(|place| match term.port {
                 Port::Equation | Port::Sensor => matches!(place, Place::Equation(_)),

@@ -255,17 +255,18 @@ fn substituted(text: &str, part: Span, mut pieces: Vec<(Span, String)>) -> Strin
     out
 }
 
-/// Where effects may enter: every equation that is no definition (of a rate, of a stretch) and no plain sensor, every input, and of the parameters the
-/// first `own`, but for those that are times of delays.
-pub(crate) fn places(spec: &ModelSpec, own: usize) -> Vec<Place> {
+/// Where effects may enter: every equation that is no definition (of a rate, of a stretch) and no plain sensor, every input, and
+/// every parameter but times of delays; of all these what the given plant has, not what effects have added to it.
+pub(crate) fn places(spec: &ModelSpec, given: &ModelSpec) -> Vec<Place> {
     let mut found = Vec::new();
+    let own = given.parameters().len();
     for (at, equation) in spec.equations.iter().enumerate() {
         let plain = equation.coefficient.is_none()
             && matches!(spec.expressions.node(equation.rest), Node::Variable(_));
         let kinematic = matches!(equation.unknown, Unknown::Value(_))
             && equation.coefficient.is_none()
             && adds_states(spec, equation.rest);
-        if !plain && !kinematic {
+        if !plain && !kinematic && is_of(spec, equation.unknown.variable(), given) {
             found.push(Place::Equation(at));
         }
     }
@@ -282,6 +283,11 @@ pub(crate) fn places(spec: &ModelSpec, own: usize) -> Vec<Place> {
             .map(Place::Parameter),
     );
     found
+}
+
+/// Whether a variable is one of the plant that was given.
+pub(super) fn is_of(spec: &ModelSpec, v: VariableId, given: &ModelSpec) -> bool {
+    given.find(&spec.variable(v).name).is_some()
 }
 
 /// Whether an expression only adds and subtracts states and their derivatives, as the stretch of a spring: a definition.
@@ -369,7 +375,7 @@ end Tank;
     #[test]
     fn every_place_can_be_changed() {
         let spec = parse(TANK).unwrap();
-        let places = places(&spec, 2);
+        let places = places(&spec, &spec);
         assert_eq!(places.len(), 6, "{places:?}");
         for place in places {
             let edit = term(place, "{v} + c*1.0");
@@ -389,7 +395,7 @@ end Tank;
              equation der(a) = va; der(va) = u - f; der(b) = f - s; y = x; end M;",
         )
         .unwrap();
-        let names: Vec<&str> = places(&spec, 1)
+        let names: Vec<&str> = places(&spec, &spec)
             .iter()
             .map(|p| spec.variable(p.variable(&spec)).name.as_str())
             .collect();

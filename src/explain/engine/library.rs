@@ -26,8 +26,10 @@ pub(crate) enum Needs {
     Radiation,
     /// A difference of two variables of one unit.
     Difference,
-    /// An angle that covers half a turn or more.
+    /// An angle.
     Angle,
+    /// A velocity of both signs.
+    Velocity,
     /// The state whose derivative the equation determines.
     OwnState,
     /// No argument: a function of time alone.
@@ -148,7 +150,7 @@ const TIMES: &[f64] = &[
     0.9, 0.95,
 ];
 
-use Needs::{Angle, Anything, BothSigns, Difference, OwnState, Positive, Radiation, Time};
+use Needs::{Angle, Anything, BothSigns, Difference, OwnState, Positive, Radiation, Time, Velocity};
 use Port::{Equation, Input, Parameter, Sensor};
 
 /// A function that nobody listed: its text is that of its pieces.
@@ -171,7 +173,7 @@ pub(crate) const TERMS: &[Term] = &[
     curve(
         "stribeck",
         Equation,
-        BothSigns,
+        Velocity,
         "tanh({z}/{w})*(1 + {r}*exp(-abs({z})/{vs}))",
         &[
             shape("w", Starts::Spread(&[0.02]), true),
@@ -198,7 +200,7 @@ pub(crate) const TERMS: &[Term] = &[
     Term {
         id: "stribeck_bristles",
         port: Equation,
-        needs: BothSigns,
+        needs: Velocity,
         form: "{m}",
         memories: &[Memory {
             rate: "({z} - abs({z})*{m}/(1 + {r}*exp(-abs({z})/{vs})))/{s}",
@@ -325,7 +327,7 @@ pub(crate) const TERMS: &[Term] = &[
             shape(
                 "k",
                 Starts::Waves(&[
-                    1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0,
+                    1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0,
                 ]),
                 true,
             ),
@@ -487,7 +489,11 @@ pub(crate) const TERMS: &[Term] = &[
                 start: MemoryStart::Zero,
             },
         ],
-        shapes: &[shape("S", Starts::Spread(&[0.1, 0.3, 0.6]), true)],
+        shapes: &[shape(
+            "S",
+            Starts::Spread(&[0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0]),
+            true,
+        )],
         free_strength: false,
         symbol: "",
         units: &[],

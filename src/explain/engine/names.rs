@@ -52,6 +52,11 @@ fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
     }
 }
 
+/// Whether all of these are velocities.
+pub(super) fn is_velocity(spec: &ModelSpec, variables: &[VariableId]) -> bool {
+    kind(spec, variables) == Kind::Velocity
+}
+
 /// Whether a state with this unit is what a store holds: a level, a charge, a share of it.
 fn flows(unit: &str) -> bool {
     matches!(
@@ -83,6 +88,21 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
             "law"
         }
         ("overflow", Some(&edge)) if found.lead.term.id == "root_above" && low(edge) => "leak",
+        _ => id,
+    }
+}
+
+/// Effects that are forms of one: what a second of them finds is what the first left.
+pub(crate) fn family(id: &str) -> &str {
+    match id {
+        "stribeck_friction" | "hysteresis" => "coulomb_friction",
+        "cubic_drag" | "asymmetric_damping" => "quadratic_drag",
+        "quadratic_stiffness" | "end_stop" => "cubic_stiffness",
+        "backlash" => "extra_mode",
+        "valve_stiction" => "input_backlash",
+        "actuator_lag" => "input_delay",
+        "input_curve" | "input_asymmetry" | "input_dead_zone" => "input_saturation",
+        "sensor_drift" => "sensor_offset",
         _ => id,
     }
 }
@@ -131,9 +151,8 @@ pub(crate) fn called(
             "quadratic_stiffness"
         }
         (Port::Equation, "friction") if what == Kind::Velocity => "coulomb_friction",
-        (Port::Equation, "stribeck") if what == Kind::Velocity => "stribeck_friction",
-        (Port::Equation, "stribeck_bristles") if what == Kind::Velocity => "stribeck_friction",
-        (Port::Equation, "bristles" | "stribeck_bristles") => "hysteresis",
+        (Port::Equation, "stribeck" | "stribeck_bristles") => "stribeck_friction",
+        (Port::Equation, "bristles") => "hysteresis",
         (Port::Equation, id @ ("extra_mode" | "backlash")) => id,
         (Port::Equation, "one_sided") if what == Kind::Velocity => "asymmetric_damping",
         (Port::Equation, "above" | "below" | "both_sides") => match what {
@@ -192,8 +211,16 @@ pub(crate) fn rank(spec: &ModelSpec, found: &Fitted) -> u8 {
     rank_of(spec, found.lead.term, found.lead.place, &variables)
 }
 
+/// The part of the rank that its name has.
+pub(crate) fn name_rank(spec: &ModelSpec, found: &Fitted) -> u8 {
+    rank(spec, found) / PLACES
+}
+
+/// Ranks of one name at different places.
+const PLACES: u8 = 4;
+
 /// Ranks below this are names of their own.
-pub(super) const SPECIFIC: u8 = 4;
+pub(super) const SPECIFIC: u8 = PLACES;
 
 /// The rank of a term at a place, as a function of variables.
 pub(super) fn rank_of(spec: &ModelSpec, term: &Term, place: Place, variables: &[VariableId]) -> u8 {
@@ -217,5 +244,5 @@ pub(super) fn rank_of(spec: &ModelSpec, term: &Term, place: Place, variables: &[
         "input_curve" | "parameter_change" => 2 + of_place,
         _ => of_place,
     };
-    4 * of_name + elsewhere
+    PLACES * of_name + elsewhere
 }

@@ -26,8 +26,12 @@ pub(super) struct Hooked {
     pub columns: Vec<usize>,
 }
 
-pub(super) fn hooked(spec: &ModelSpec, own: usize, arguments: &[Argument]) -> Option<Hooked> {
-    let places = places(spec, own);
+pub(super) fn hooked(
+    spec: &ModelSpec,
+    given: &ModelSpec,
+    arguments: &[Argument],
+) -> Option<Hooked> {
+    let places = places(spec, given);
     let mut edit = Edit::default();
     let mut columns = Vec::new();
     let inputs = spec.inputs();

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::argument::{Argument, ArgumentForm, arguments};
 use super::curve::{Curve, curves};
-use super::edit::{Place, sensors};
+use super::edit::{Place, is_of, sensors};
 use super::library::{Needs, Port, Starts, TERMS, Term};
 use super::names::rank_of;
 use super::path::{hooked, path};
@@ -84,16 +84,17 @@ pub(crate) struct Screen {
     pub arguments: Vec<Argument>,
 }
 
-/// Tests every term at every place; of the parameters the first `own` are the plant's, the others those of effects.
+/// Tests every term at every place that the given plant has; what effects have added to it is neither place nor argument.
 pub(crate) fn screen(
     study: &Study,
     fit: &Fit,
-    own: usize,
+    given: &ModelSpec,
     recordings: &[PlantRecording],
 ) -> Option<Screen> {
     let spec = &study.plant().spec;
     let mut arguments = arguments(spec);
-    let hooked = hooked(spec, own, &arguments)?;
+    arguments.retain(|a| a.variables.iter().all(|&v| is_of(spec, v, given)));
+    let hooked = hooked(spec, given, &arguments)?;
     let path = path(study, fit, &hooked, recordings, &mut arguments)?;
     let projection = Projection::new(study, fit)?;
     let gain = study.gain(fit);

@@ -7,7 +7,7 @@ use super::candidate::{Candidate, candidate};
 use super::holdout::HeldOut;
 use super::hypothesis::{Ground, Trial, prefer_asked, trials};
 use super::library::Starts;
-use super::names::{SPECIFIC, named, rank, rank_of};
+use super::names::{SPECIFIC, family, name_rank, named, rank, rank_of};
 use super::scope::Scope;
 use super::screen::{Lead, Screen, screen};
 use crate::physics::estimate::{
@@ -31,10 +31,12 @@ pub(super) const GLANCE: Effort = Effort {
 const GLANCED_ACCURACY: f64 = 1e-6;
 /// Steps a sample that a candidate may need, on average; one that needs more is left out, for the time it costs.
 const GLANCED_STEPS: usize = 20;
-pub(super) const MOST_STEPS: usize = 30;
+pub(super) const MOST_STEPS: usize = 60;
 /// The best of these are fitted with a noise model of their own, and the best of them until nothing changes.
 const FITTED: usize = 5;
 const FINISHED: usize = 4;
+/// ... and names that gain this part of the best.
+const HALF: f64 = 0.5;
 pub(super) const THOROUGH: Effort = Effort {
     iterations: 20,
     settled: 0.05,
@@ -46,6 +48,8 @@ pub(crate) const NEEDED: f64 = 16.0;
 /// A name is given where the gain is at least this; between [`NEEDED`] and this the place is given, and the best term as a
 /// rival (math/physics.md, "Fits and decision").
 pub(crate) const SURE: f64 = 24.0;
+/// Beside an effect, terms are fitted whose test foretells this part of the gain that is needed.
+const FORETOLD: f64 = 0.25;
 /// A second effect must gain more, and at least this part of the first.
 pub(super) const SECOND: (f64, f64) = (30.0, 0.12);
 /// Level of the test that asks for one: of all score tests together.
@@ -236,8 +240,10 @@ struct Stage<'a> {
     plant: &'a Plant,
     study: &'a Study<'a>,
     fit: &'a Fit,
-    /// Parameters of the plant before effects were found.
-    own: usize,
+    /// The plant before effects were found.
+    given: &'a ModelSpec,
+    /// Gain that an effect needs.
+    needed: f64,
     /// Effects that were found.
     accepted: usize,
     recordings: &'a [PlantRecording],
@@ -275,7 +281,8 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
         plant,
         study,
         fit,
-        own,
+        given,
+        needed,
         accepted,
         recordings,
         options,
@@ -286,7 +293,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
     let parameters = study.parameters();
     let outputs = study.outputs();
     let mut tried: Vec<(Screen, Fit)> = Vec::new();
-    if let Some(s) = screen(study, fit, own, recordings) {
+    if let Some(s) = screen(study, fit, given, recordings) {
         tried.push((s, fit.clone()));
     }
     let strongest = tried.first().map_or((0.0, 0), |(s, _)| {
@@ -307,7 +314,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
         && !options.least_squares
         && let Some(white) = study.least_squares(&fit.point)
         && study.follows(&white)
-        && let Some(s) = screen(study, &white, own, recordings)
+        && let Some(s) = screen(study, &white, given, recordings)
     {
         tried.push((s, white));
     }
@@ -317,7 +324,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
         && fit.form == Form::Innovation
         && fit.noise.degrees.is_finite()
         && let Some(gaussian) = study.gaussian(fit)
-        && let Some(s) = screen(study, &gaussian, own, recordings)
+        && let Some(s) = screen(study, &gaussian, given, recordings)
         && chance(s.leads.first().map_or(0.0, |l| l.statistic)) * s.tests as f64 <= LEFT
     {
         tried.push((s, gaussian));
@@ -329,6 +336,11 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
     }
     for (screen, _) in &mut tried {
         scope.restrict(&plant.spec, screen);
+        if accepted > 0 {
+            let least = FORETOLD * needed / study.information();
+            screen.leads.retain(|l| l.statistic >= least);
+            screen.curves.retain(|l| l.statistic >= least);
+        }
     }
     let mut glanced: Vec<(f64, Lead, usize, Candidate, Fit)> = tried
         .iter()
@@ -432,12 +444,19 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
     };
     fitted.extend(trials(&scope.hypotheses, open, &ground));
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    // Among those that explain the recording as well as the best, the one with a name of its own comes first.
+    // Among those that explain the recording as well as the best, the one with a name of its own comes first. Of several such
+    // the best, unless their gains are equal.
     if let Some((best, curve)) = fitted.first().map(|f| (f.gain, f.lead.curve.is_some())) {
         let (least, part) = if curve { TIE_WITH_CURVE } else { TIE };
         let tie = least.max(part * best);
         let ties = fitted.iter().take_while(|f| best - f.gain <= tie).count();
-        fitted[..ties].sort_by_key(|f| rank(&plant.spec, f));
+        fitted[..ties].sort_by_key(|f| name_rank(&plant.spec, f));
+        let (first, of_name) = (fitted[0].gain, name_rank(&plant.spec, &fitted[0]));
+        let equal = |f: &&Fitted| {
+            first - f.gain <= TIE.0 && name_rank(&plant.spec, f) == of_name
+        };
+        let equals = fitted[..ties].iter().take_while(equal).count();
+        fitted[..equals].sort_by_key(|f| rank(&plant.spec, f));
         prefer_asked(&mut fitted);
     }
     (fitted, strongest)
@@ -452,10 +471,17 @@ fn finished(
     options: &EstimateOptions,
 ) -> Vec<Fitted> {
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let best = fitted.first().map_or(0.0, |f| f.gain);
+    let spec = &study.plant().spec;
     let refined: Vec<Option<Fit>> = fitted
         .par_iter()
-        .take(FINISHED)
-        .map(|f| {
+        .enumerate()
+        .map(|(i, f)| {
+            // A name must not lose to a curve for the steps that its fit lacks.
+            let named = rank(spec, f) < SPECIFIC && f.gain > HALF * best && i < 2 * FINISHED;
+            if i >= FINISHED && !named {
+                return None;
+            }
             let options = with_more(options, f.candidate.values.len());
             let limited = f.candidate.plant.clone().with_most_steps(MOST_STEPS);
             let inner = study.of(&limited, &options).ok()?;
@@ -505,7 +531,6 @@ pub(crate) fn search(
     let mut now = plant.clone();
     let mut fit = baseline.clone();
     let mut tests = Vec::new();
-    let own = plant.spec.parameters().len();
     let mut accepted_so_far = 0;
     let mut asked = vec![Trial::default(); scope.hypotheses.len()];
     for count in 0..=MOST {
@@ -518,13 +543,18 @@ pub(crate) fn search(
         let open: Vec<usize> = (0..asked.len())
             .filter(|&i| asked[i].accepted.is_none())
             .collect();
+        let needed = match steps.first().and_then(|s| s.first()) {
+            None => NEEDED,
+            Some(first) => SECOND.0.max(SECOND.1 * first.gain),
+        };
         let mut attempts = 0;
         let (fitted, strongest) = loop {
             let stage = Stage {
                 plant: &now,
                 study: &study,
                 fit: &fit,
-                own,
+                given: &plant.spec,
+                needed,
                 accepted: accepted_so_far,
                 recordings,
                 options: &options,
@@ -554,10 +584,6 @@ pub(crate) fn search(
             }
         }
         tests.push(strongest);
-        let needed = match steps.first().and_then(|s| s.first()) {
-            None => NEEDED,
-            Some(first) => SECOND.0.max(SECOND.1 * first.gain),
-        };
         // What comes second must have a name of its own, and not that of the first: a function without a name may be what is
         // left of the first.
         let first = steps.first().and_then(|s| s.first());
@@ -566,7 +592,7 @@ pub(crate) fn search(
                 let id = named(&now.spec, f);
                 f.hypothesis.is_some()
                     || !matches!(id, "law" | "cross_coupling" | "viscous_friction")
-                        && id != named(&plant.spec, first)
+                        && family(id) != family(named(&plant.spec, first))
             })
         };
         let best = fitted.first().filter(new);

@@ -39,7 +39,7 @@ fn names() -> BTreeSet<&'static str> {
         for term in TERMS {
             let mut at: Vec<Place> = match term.port {
                 Port::Sensor => sensors.iter().map(|&s| Place::Equation(s)).collect(),
-                _ => places(&spec, usize::MAX),
+                _ => places(&spec, &spec),
             };
             at.retain(|place| match term.port {
                 Port::Equation | Port::Sensor => matches!(place, Place::Equation(_)),
