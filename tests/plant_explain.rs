@@ -132,6 +132,25 @@ fn what_is_not_available_with_plants_is_said() {
 }
 
 #[test]
+fn a_contact_that_lasts_a_few_samples_is_named() {
+    let folder = Folder::new();
+    folder.text("cart.mo", CART);
+    let stop = |x: f64, _: f64, _: f64| -1500.0 * (x - 0.9).max(0.0);
+    record(&folder, "log.csv", 1.1, stop, 4);
+    let said = explained(&folder, "log.csv");
+    assert_eq!(said["verdict"], "named", "{}", said["summary"]);
+    let effect = &said["effects"][0];
+    assert_eq!(effect["effect"], "end_stop", "{}", said["summary"]);
+    assert_eq!(effect["depends"][0], "x");
+    let gap = &effect["parameters"]["above_from"];
+    let (value, std) = (gap["value"].as_f64().unwrap(), gap["std"].as_f64().unwrap());
+    assert!(
+        (value - 0.9).abs() < 4.0 * std + 0.005 && std < 0.02,
+        "{value} +- {std}"
+    );
+}
+
+#[test]
 fn effects_are_left_out_or_tried_alone() {
     let folder = Folder::new();
     folder.text("cart.mo", CART);

@@ -108,8 +108,7 @@ pub(crate) fn candidate(
             format!("({})", &spec.text[span.start..span.end])
         },
     );
-    let body =
-        filled(term.form, term, &text, &memories, &shapes, h).replace("{a}", &factor);
+    let body = filled(term.form, term, &text, &memories, &shapes, h).replace("{a}", &factor);
     for (memory, name) in term.memories.iter().zip(&memories) {
         let first = memory.start.at(argument.map_or(0.0, |a| a.values[0][0]));
         let source = if lead.sensor {

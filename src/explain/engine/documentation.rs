@@ -95,9 +95,43 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
         )],
     ),
     effect(
+        "extra_mode",
+        "a part that moves on its own",
+        "(1 - f)*J*der(w) = ... - F, and f*J*der(w2) = F: a spring and a damper, or a resistance, between the two",
+        "the equation of a derivative",
+        "the state itself",
+        &[
+            like(
+                "sensor_lag",
+                "Excite at higher frequencies: behind a lag the output only gets smaller, a part on a spring has a resonance.",
+            ),
+            like(
+                "actuator_lag",
+                "Start from another initial state without an input: an actuator that lags does nothing then.",
+            ),
+        ],
+    ),
+    effect(
+        "backlash",
+        "play between two parts",
+        "(1 - f)*J*der(w) = ... - F, and f*J*der(w2) = F, where F is zero while the parts are within g of the middle",
+        "the equation of a derivative",
+        "the state itself",
+        &[
+            like(
+                "input_backlash",
+                "Coast without an input and reverse the load: play of an actuator does nothing then.",
+            ),
+            like(
+                "extra_mode",
+                "Excite with several sizes: the frequency of a resonance does not depend on the size, that of play does.",
+            ),
+        ],
+    ),
+    effect(
         "stribeck_friction",
         "friction that falls with speed",
-        "m*der(v) = ... + c*tanh(v/w)*exp(-abs(v)/vs)",
+        "m*der(v) = ... + c*tanh(v/w)*(1 + r*exp(-abs(v)/vs))",
         ANY_EQUATION,
         A_VELOCITY,
         &[like(

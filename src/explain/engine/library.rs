@@ -150,7 +150,9 @@ const TIMES: &[f64] = &[
     0.9, 0.95,
 ];
 
-use Needs::{Angle, Anything, BothSigns, Difference, OwnState, Positive, Radiation, Time, Velocity};
+use Needs::{
+    Angle, Anything, BothSigns, Difference, OwnState, Positive, Radiation, Time, Velocity,
+};
 use Port::{Equation, Input, Parameter, Sensor};
 
 /// A function that nobody listed: its text is that of its pieces.

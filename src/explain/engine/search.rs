@@ -452,9 +452,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
         let ties = fitted.iter().take_while(|f| best - f.gain <= tie).count();
         fitted[..ties].sort_by_key(|f| name_rank(&plant.spec, f));
         let (first, of_name) = (fitted[0].gain, name_rank(&plant.spec, &fitted[0]));
-        let equal = |f: &&Fitted| {
-            first - f.gain <= TIE.0 && name_rank(&plant.spec, f) == of_name
-        };
+        let equal = |f: &&Fitted| first - f.gain <= TIE.0 && name_rank(&plant.spec, f) == of_name;
         let equals = fitted[..ties].iter().take_while(equal).count();
         fitted[..equals].sort_by_key(|f| rank(&plant.spec, f));
         prefer_asked(&mut fitted);
