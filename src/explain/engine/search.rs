@@ -392,23 +392,29 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
         .filter_map(|(lead, which, made, from)| {
             let arguments = &tried[which].0.arguments;
             let options = with_more(options, made.values.len());
-            let limited = made.plant.clone().with_most_steps(MOST_STEPS);
-            let inner = study.of(&limited, &options).ok()?;
-            let from = Fit {
-                form: fit.form,
-                point: if from.form == fit.form {
-                    from.point
-                } else {
-                    // From free run to the observer of the fit before.
-                    let mut point = from.point;
-                    let gains = states * outputs;
-                    point.extend(&fit.point[fit.point.len() - gains..]);
-                    point.extend(std::iter::repeat_n(0.0, made.new_states * outputs));
-                    point
-                },
-                ..from
-            };
-            let best = inner.refit(&from, 1, THOROUGH)?;
+            let rough = made
+                .plant
+                .clone()
+                .with_accuracy(GLANCED_ACCURACY)
+                .with_most_steps(MOST_STEPS);
+            let inner = study.of(&rough, &options).ok()?;
+            // Where an observer had to follow what was missing, a free run may do now.
+            let mut starts = vec![from.clone()];
+            if from.form != fit.form {
+                let mut point = from.point.clone();
+                let gains = states * outputs;
+                point.extend(&fit.point[fit.point.len() - gains..]);
+                point.extend(std::iter::repeat_n(0.0, made.new_states * outputs));
+                starts.push(Fit {
+                    form: fit.form,
+                    point,
+                    ..from
+                });
+            }
+            let best = starts
+                .iter()
+                .filter_map(|start| inner.refit(start, 1, THOROUGH))
+                .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
             let gain = fit.criterion - best.criterion - searched(&lead, recordings);
             let argument = lead.argument.map(|a| &arguments[a]);
             Some(Fitted {
