@@ -5,6 +5,8 @@ pub(crate) mod candidate;
 pub(crate) mod curve;
 pub(crate) mod documentation;
 pub(crate) mod edit;
+mod eliminate;
+pub(crate) mod fitted;
 pub(crate) mod holdout;
 pub(crate) mod hypothesis;
 pub(crate) mod library;

@@ -3,8 +3,8 @@
 use crate::physics::{ModelSpec, Node, Unknown, VariableId, VariableKind};
 
 use super::edit::Place;
-use super::library::{Port, Term};
-use super::search::Fitted;
+use super::fitted::Fitted;
+use super::library::{Needs, Port, Term};
 
 /// What kind of quantity an argument is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -229,6 +229,10 @@ pub(super) fn rank_of(spec: &ModelSpec, term: &Term, place: Place, variables: &[
             let own = place.variable(spec);
             let elsewhere = match spec.equations[at].unknown {
                 _ if variables.contains(&own) || term.port != Port::Equation => 0,
+                // A load acts on what moves, before what drives it.
+                Unknown::Derivative(v) if term.needs == Needs::Time && !is_velocity(spec, &[v]) => {
+                    2
+                }
                 Unknown::Derivative(_) => 1,
                 Unknown::Value(_) if spec.variable(own).output => 2,
                 Unknown::Value(_) => 3,

@@ -59,6 +59,16 @@ impl Lead {
         }
     }
 
+    /// The same at a place of another text.
+    pub(super) fn at(self, place: Place, argument: Option<usize>, shapes: &[f64]) -> Self {
+        Self {
+            place,
+            argument,
+            shapes: shapes.to_vec(),
+            ..self
+        }
+    }
+
     /// Whether a recording hardly tells two terms apart.
     fn same_as(&self, other: &Self) -> bool {
         let sign = if self.strength * other.strength < 0.0 {

@@ -4,10 +4,12 @@ use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::candidate::{Candidate, candidate};
+use super::eliminate::alone;
+use super::fitted::{Fitted, TIE, order, searched, with_more};
 use super::holdout::HeldOut;
-use super::hypothesis::{Ground, Trial, prefer_asked, trials};
+use super::hypothesis::{Ground, Trial, trials};
 use super::library::Starts;
-use super::names::{SPECIFIC, family, name_rank, named, rank, rank_of};
+use super::names::{SPECIFIC, family, named, rank, rank_of};
 use super::scope::Scope;
 use super::screen::{Lead, Screen, screen};
 use crate::physics::estimate::{
@@ -43,6 +45,13 @@ pub(super) const THOROUGH: Effort = Effort {
     attempts: 8,
 };
 pub(super) const ROUNDS: usize = 2;
+/// Times of a change that are tried on either side, and no step of a fit.
+const TIMES: usize = 10;
+const AS_IT_IS: Effort = Effort {
+    iterations: 0,
+    settled: 0.0,
+    attempts: 0,
+};
 /// Gain in Schwarz's criterion that is needed, beyond the penalty for what was searched: odds of e^8 (math/physics.md).
 pub(crate) const NEEDED: f64 = 16.0;
 /// A name is given where the gain is at least this; between [`NEEDED`] and this the place is given, and the best term as a
@@ -54,38 +63,11 @@ const FORETOLD: f64 = 0.25;
 pub(super) const SECOND: (f64, f64) = (30.0, 0.12);
 /// Level of the test that asks for one: of all score tests together.
 const LEFT: f64 = 0.01;
-/// Gains that differ by less, or by this part of the best, are equal.
-pub(crate) const TIE: (f64, f64) = (6.0, 0.08);
-/// The same where the best is a curve: it is free to follow any effect (math/physics.md, "Fits and decision").
-const TIE_WITH_CURVE: (f64, f64) = (12.0, 0.04);
-/// A gain must not rest on so few values: they may be errors of the recording.
-const FEW: usize = 1;
 /// A better fit of the plant itself is taken from here on, and so often at most.
 const BETTER: f64 = 1.0;
 const BETTER_FITS: usize = 2;
 /// Most effects that are named.
 const MOST: usize = 2;
-
-/// A candidate that was fitted.
-#[derive(Debug, Clone)]
-pub(crate) struct Fitted {
-    pub lead: Lead,
-    /// What the term is a function of.
-    pub depends: Vec<String>,
-    /// The same as an expression.
-    pub argument: String,
-    /// Values that the argument had, and the range of its integral.
-    pub range: (f64, f64),
-    pub travel: f64,
-    /// Fitted values of the shapes.
-    pub shapes: Vec<f64>,
-    pub candidate: Candidate,
-    pub fit: Fit,
-    /// Gain in the criterion over the plant without it, less the penalty of the search.
-    pub gain: f64,
-    /// Place in the user's hypotheses; none for a term of the library.
-    pub hypothesis: Option<usize>,
-}
 
 /// What the search has found.
 pub(crate) struct Found {
@@ -150,49 +132,6 @@ impl Found {
             trial.accepted = trial.accepted.filter(|&step| step < accepted);
         }
     }
-}
-
-impl Fitted {
-    /// The gain without the [`FEW`] values that it owes most to.
-    fn gain_without_few(&self, study: &Study, before: &Fit, options: &EstimateOptions) -> f64 {
-        let options = with_more(options, self.candidate.values.len());
-        let lost = || {
-            let own = study.of(&self.candidate.plant, &options).ok()?;
-            let noise = &self.fit.noise;
-            let losses = |of: &Study, fit: &Fit| -> Option<Vec<f64>> {
-                let whitened = noise.whiten_kept(&of.residual(fit)?, of.mask());
-                Some(whitened.into_iter().map(|e| noise.loss(e)).collect())
-            };
-            let (old, new) = (losses(study, before)?, losses(&own, &self.fit)?);
-            let mut decrease: Vec<f64> = old.iter().zip(&new).map(|(a, b)| a - b).collect();
-            let whole: f64 = decrease.iter().sum();
-            decrease.sort_by(|a, b| b.total_cmp(a));
-            let few: f64 = decrease.iter().take(FEW).sum();
-            Some(few / whole.max(few))
-        };
-        let deviance = study.information() * (before.deviance - self.fit.deviance);
-        self.gain - lost().unwrap_or(0.0) * deviance
-    }
-}
-
-/// Penalty for the values of a shape that were searched.
-fn searched(lead: &Lead, recordings: &[PlantRecording]) -> f64 {
-    let samples = recordings.iter().map(|r| r.outputs[0].len()).sum::<usize>() as f64;
-    lead.term
-        .shapes
-        .iter()
-        .map(|shape| match shape.starts {
-            Starts::Length(_) => 2.0 * (samples / 20.0).ln(),
-            Starts::Waves(_) => 7.0,
-            Starts::Quantiles(_) | Starts::SizeQuantiles(_) => 2.5,
-            Starts::Spread(_)
-            | Starts::Samples(_)
-            | Starts::Travel(_)
-            | Starts::Moved(_)
-            | Starts::Rate(_) => 2.0,
-            Starts::Values(_) | Starts::Share(_) => 0.0,
-        })
-        .sum()
 }
 
 /// Probability of a chi-square with one degree of freedom beyond `statistic`.
@@ -450,20 +389,37 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
     };
     fitted.extend(trials(&scope.hypotheses, open, &ground));
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    // Among those that explain the recording as well as the best, the one with a name of its own comes first. Of several such
-    // the best, unless their gains are equal.
-    if let Some((best, curve)) = fitted.first().map(|f| (f.gain, f.lead.curve.is_some())) {
-        let (least, part) = if curve { TIE_WITH_CURVE } else { TIE };
-        let tie = least.max(part * best);
-        let ties = fitted.iter().take_while(|f| best - f.gain <= tie).count();
-        fitted[..ties].sort_by_key(|f| name_rank(&plant.spec, f));
-        let (first, of_name) = (fitted[0].gain, name_rank(&plant.spec, &fitted[0]));
-        let equal = |f: &&Fitted| first - f.gain <= TIE.0 && name_rank(&plant.spec, f) == of_name;
-        let equals = fitted[..ties].iter().take_while(equal).count();
-        fitted[..equals].sort_by_key(|f| rank(&plant.spec, f));
-        prefer_asked(&mut fitted);
-    }
+    order(&plant.spec, &mut fitted);
     (fitted, strongest)
+}
+
+/// A fit with the time of its change moved where that is better: between the times that were tested there are more optima than
+/// one, and descent ends in the nearest.
+fn at_its_time(study: &Study, f: &Fitted) -> Fit {
+    let mut best = f.fit.clone();
+    let first = study.parameters() - f.candidate.values.len();
+    for (i, shape) in f.lead.term.shapes.iter().enumerate() {
+        let Starts::Length(parts) = shape.starts else {
+            continue;
+        };
+        if shape.positive {
+            continue;
+        }
+        let apart = study.duration() * (parts[1] - parts[0]);
+        let from = f.fit.point[first + i];
+        for k in 1..=TIMES {
+            for sign in [-1.0, 1.0] {
+                let mut trial = f.fit.clone();
+                trial.point[first + i] = from + sign * apart * k as f64 / TIMES as f64;
+                if let Some(moved) = study.refit(&trial, 0, AS_IT_IS)
+                    && moved.deviance < best.deviance
+                {
+                    best = moved;
+                }
+            }
+        }
+    }
+    best
 }
 
 /// The best of all fits, fitted until nothing changes; the others as they are. Best first.
@@ -489,7 +445,7 @@ fn finished(
             let options = with_more(options, f.candidate.values.len());
             let limited = f.candidate.plant.clone().with_most_steps(MOST_STEPS);
             let inner = study.of(&limited, &options).ok()?;
-            inner.refit(&f.fit, ROUNDS, THOROUGH)
+            inner.refit(&at_its_time(&inner, f), ROUNDS, THOROUGH)
         })
         .collect();
     for (f, refined) in fitted.iter_mut().zip(refined) {
@@ -505,10 +461,28 @@ fn finished(
     fitted
 }
 
-pub(crate) fn with_more(options: &EstimateOptions, count: usize) -> EstimateOptions {
+/// The second of two effects alone where the first is of no use beside it: both together gain less over it than a second
+/// effect must.
+fn without_first(
+    plant: &Plant,
+    stage: &Study,
+    baseline: &Fit,
+    [first, second]: [&Fitted; 2],
+    recordings: &[PlantRecording],
+    options: &EstimateOptions,
+) -> Option<Fitted> {
+    if first.hypothesis.is_some() || second.hypothesis.is_some() {
+        return None;
+    }
     let mut options = options.clone();
-    options.free.extend(std::iter::repeat_n(true, count));
-    options
+    options.free.truncate(plant.spec.parameters().len());
+    let study = Study::new(plant, recordings, &options)
+        .ok()?
+        .with_information(stage.information());
+    let alone = alone(plant, &study, baseline, first, second, recordings, &options)?;
+    let both = first.gain + second.gain;
+    let needed = SECOND.0.max(SECOND.1 * alone.gain);
+    (both - alone.gain < needed).then_some(alone)
 }
 
 /// What the equations leave out.
@@ -537,7 +511,10 @@ pub(crate) fn search(
     let mut tests = Vec::new();
     let mut accepted_so_far = 0;
     let mut asked = vec![Trial::default(); scope.hypotheses.len()];
-    for count in 0..=MOST {
+    // One effect more than may be named: the first may be dropped again.
+    let mut may_drop = true;
+    for _ in 0..=MOST + 1 {
+        let count = accepted_so_far;
         let mut study = Study::new(&now, recordings, &options)?;
         if least_squares {
             let share = study.effective_share(&fit).unwrap_or(1.0);
@@ -607,6 +584,25 @@ pub(crate) fn search(
             }
             break;
         };
+        if may_drop
+            && let Some(first) = first
+            && let Some(alone) = without_first(
+                plant,
+                &study,
+                &baseline,
+                [first, &best],
+                recordings,
+                &options,
+            )
+        {
+            may_drop = false;
+            options.free.truncate(plant.spec.parameters().len());
+            options = with_more(&options, alone.candidate.values.len());
+            (now, fit) = (alone.candidate.plant.clone(), alone.fit.clone());
+            tests.truncate(1);
+            steps[0].insert(0, alone);
+            continue;
+        }
         options = with_more(&options, best.candidate.values.len());
         now = best.candidate.plant.clone();
         fit = best.fit.clone();

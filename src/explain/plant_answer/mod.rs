@@ -7,11 +7,12 @@ mod question;
 pub use question::{PlantOptions, PlantQuestionError};
 
 use super::answer::extremes;
+use super::engine::fitted::Fitted;
 use super::engine::holdout::{HeldOut, blocks};
 use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
 use super::engine::library::Port;
 use super::engine::scope::Scope;
-use super::engine::search::{Fitted, Found, SURE, chance};
+use super::engine::search::{Found, SURE, chance};
 use super::engine::select::{CHANCE, select};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,

@@ -146,6 +146,12 @@ impl<'a> Study<'a> {
         self.problem.count()
     }
 
+    /// Length of the longest recording, in seconds.
+    pub fn duration(&self) -> f64 {
+        let of = |r: &PlantRecording| r.outputs[0].len() as f64 * r.sample_time;
+        self.problem.recordings.iter().map(of).fold(0.0, f64::max)
+    }
+
     /// Number of free parameters.
     pub fn parameters(&self) -> usize {
         self.problem.free.len()

@@ -1,0 +1,87 @@
+//! Backward elimination: whether what was found second explains the recording without what was found first.
+//!
+//! The first effect is the best that one term can do while the other is missing, and a flexible term can stand for both. Once
+//! the second is there the first may be of no use.
+
+use super::argument::arguments;
+use super::candidate::candidate;
+use super::edit::Place;
+use super::fitted::{Fitted, searched, with_more};
+use super::path::{hooked, path};
+use super::search::{MOST_STEPS, ROUNDS, THOROUGH};
+use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
+use crate::physics::{ModelSpec, Plant};
+
+/// The place of the same name in another text.
+fn same_place(place: Place, of: &ModelSpec, given: &ModelSpec) -> Option<Place> {
+    let v = given.find(&of.variable(place.variable(of)).name)?;
+    Some(match place {
+        Place::Input(_) => Place::Input(v),
+        Place::Parameter(_) => Place::Parameter(v),
+        Place::Equation(_) => Place::Equation(
+            given
+                .equations
+                .iter()
+                .position(|e| e.unknown.variable() == v)?,
+        ),
+    })
+}
+
+/// The plant with the second of two effects alone, fitted from where the two of them ended. `study` and `baseline` are those of
+/// the plant without either.
+pub(super) fn alone(
+    plant: &Plant,
+    study: &Study,
+    baseline: &Fit,
+    first: &Fitted,
+    second: &Fitted,
+    recordings: &[PlantRecording],
+    options: &EstimateOptions,
+) -> Option<Fitted> {
+    let spec = &plant.spec;
+    let place = same_place(second.lead.place, &first.candidate.plant.spec, spec)?;
+    let mut arguments = arguments(spec);
+    let hooked = hooked(spec, spec, &arguments)?;
+    path(study, baseline, &hooked, recordings, &mut arguments)?;
+    let argument = match second.lead.argument {
+        Some(_) => Some(
+            arguments
+                .iter()
+                .position(|a| a.expression == second.argument)?,
+        ),
+        None => None,
+    };
+    let lead = second.lead.clone().at(place, argument, &second.shapes);
+    let made = candidate(spec, &lead, &arguments, recordings)?;
+    // Numbers of both: parameters, those of the first, those of the second, initial states, gains of an observer.
+    let own = study.parameters();
+    let dropped = first.candidate.values.len();
+    let mut point = second.fit.point.clone();
+    if second.fit.form != baseline.form || point.len() < own + dropped {
+        return None;
+    }
+    point.drain(own..own + dropped);
+    let expected = baseline.point.len() + made.values.len();
+    // The states that the first has brought have gains of their own, at the end.
+    point.truncate(expected);
+    let options = with_more(options, made.values.len());
+    let limited = made.plant.clone().with_most_steps(MOST_STEPS);
+    let inner = study.of(&limited, &options).ok()?;
+    let from = Fit {
+        point,
+        ..second.fit.clone()
+    };
+    if from.point.len() != expected {
+        return None;
+    }
+    let fit = inner.refit(&from, ROUNDS, THOROUGH)?;
+    let gain = study.criterion(baseline) - fit.criterion - searched(&lead, recordings);
+    Some(Fitted {
+        shapes: fit.point[own..][..lead.shapes.len()].to_vec(),
+        lead,
+        candidate: made,
+        fit,
+        gain,
+        ..second.clone()
+    })
+}

@@ -1,0 +1,108 @@
+//! Candidates that were fitted, and which of them is the answer.
+
+use super::candidate::Candidate;
+use super::hypothesis::prefer_asked;
+use super::library::Starts;
+use super::names::{name_rank, rank};
+use super::screen::Lead;
+use crate::physics::ModelSpec;
+use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
+
+/// Gains that differ by less, or by this part of the best, are equal.
+pub(crate) const TIE: (f64, f64) = (6.0, 0.08);
+/// The same where the best is a curve: it is free to follow any effect (math/physics.md, "Fits and decision").
+const TIE_WITH_CURVE: (f64, f64) = (12.0, 0.04);
+/// A gain must not rest on so few values: they may be errors of the recording.
+const FEW: usize = 1;
+
+/// A candidate that was fitted.
+#[derive(Debug, Clone)]
+pub(crate) struct Fitted {
+    pub lead: Lead,
+    /// What the term is a function of.
+    pub depends: Vec<String>,
+    /// The same as an expression.
+    pub argument: String,
+    /// Values that the argument had, and the range of its integral.
+    pub range: (f64, f64),
+    pub travel: f64,
+    /// Fitted values of the shapes.
+    pub shapes: Vec<f64>,
+    pub candidate: Candidate,
+    pub fit: Fit,
+    /// Gain in the criterion over the plant without it, less the penalty of the search.
+    pub gain: f64,
+    /// Place in the user's hypotheses; none for a term of the library.
+    pub hypothesis: Option<usize>,
+}
+
+impl Fitted {
+    /// The gain without the [`FEW`] values that it owes most to.
+    pub(super) fn gain_without_few(
+        &self,
+        study: &Study,
+        before: &Fit,
+        options: &EstimateOptions,
+    ) -> f64 {
+        let options = with_more(options, self.candidate.values.len());
+        let lost = || {
+            let own = study.of(&self.candidate.plant, &options).ok()?;
+            let noise = &self.fit.noise;
+            let losses = |of: &Study, fit: &Fit| -> Option<Vec<f64>> {
+                let whitened = noise.whiten_kept(&of.residual(fit)?, of.mask());
+                Some(whitened.into_iter().map(|e| noise.loss(e)).collect())
+            };
+            let (old, new) = (losses(study, before)?, losses(&own, &self.fit)?);
+            let mut decrease: Vec<f64> = old.iter().zip(&new).map(|(a, b)| a - b).collect();
+            let whole: f64 = decrease.iter().sum();
+            decrease.sort_by(|a, b| b.total_cmp(a));
+            let few: f64 = decrease.iter().take(FEW).sum();
+            Some(few / whole.max(few))
+        };
+        let deviance = study.information() * (before.deviance - self.fit.deviance);
+        self.gain - lost().unwrap_or(0.0) * deviance
+    }
+}
+
+/// Penalty for the values of a shape that were searched.
+pub(super) fn searched(lead: &Lead, recordings: &[PlantRecording]) -> f64 {
+    let samples = recordings.iter().map(|r| r.outputs[0].len()).sum::<usize>() as f64;
+    lead.term
+        .shapes
+        .iter()
+        .map(|shape| match shape.starts {
+            Starts::Length(_) => 2.0 * (samples / 20.0).ln(),
+            Starts::Waves(_) => 7.0,
+            Starts::Quantiles(_) | Starts::SizeQuantiles(_) => 2.5,
+            Starts::Spread(_)
+            | Starts::Samples(_)
+            | Starts::Travel(_)
+            | Starts::Moved(_)
+            | Starts::Rate(_) => 2.0,
+            Starts::Values(_) | Starts::Share(_) => 0.0,
+        })
+        .sum()
+}
+
+/// Puts fits in the order in which they are given as answers, from one by their gains.
+pub(super) fn order(spec: &ModelSpec, fitted: &mut [Fitted]) {
+    // Among those that explain the recording as well as the best, the one with a name of its own comes first. Of several such
+    // the best, unless their gains are equal.
+    if let Some((best, curve)) = fitted.first().map(|f| (f.gain, f.lead.curve.is_some())) {
+        let (least, part) = if curve { TIE_WITH_CURVE } else { TIE };
+        let tie = least.max(part * best);
+        let ties = fitted.iter().take_while(|f| best - f.gain <= tie).count();
+        fitted[..ties].sort_by_key(|f| name_rank(spec, f));
+        let (first, of_name) = (fitted[0].gain, name_rank(spec, &fitted[0]));
+        let equal = |f: &&Fitted| first - f.gain <= TIE.0 && name_rank(spec, f) == of_name;
+        let equals = fitted[..ties].iter().take_while(equal).count();
+        fitted[..equals].sort_by_key(|f| rank(spec, f));
+        prefer_asked(fitted);
+    }
+}
+
+pub(crate) fn with_more(options: &EstimateOptions, count: usize) -> EstimateOptions {
+    let mut options = options.clone();
+    options.free.extend(std::iter::repeat_n(true, count));
+    options
+}
