@@ -243,8 +243,10 @@ mod tests {
             start_time: 0.0,
         }];
         let mut arguments = arguments(&spec);
-        for argument in &mut arguments {
-            argument.set(vec![(0..200).map(wave).collect()]);
+        // Of both signs, and positive.
+        for (i, argument) in arguments.iter_mut().enumerate() {
+            let lift = [1.5, 0.0][i % 2];
+            argument.set(vec![(0..200).map(|k| wave(k) + lift).collect()]);
         }
         let mut made = BTreeSet::new();
         for term in TERMS {
@@ -266,13 +268,9 @@ mod tests {
             };
             for (place, argument) in at.iter().flat_map(|p| own.iter().map(move |a| (*p, *a))) {
                 for shapes in grid(term, argument.map(|a| &arguments[a]), &recordings) {
-                    let lead = Lead {
-                        sensor: term.port == Port::Sensor,
-                        argument,
-                        strength: 0.1,
-                        shapes,
-                        ..Lead::untested(term, place)
-                    };
+                    let mut lead = Lead::untested(term, place).at(place, argument, &shapes);
+                    lead.sensor = term.port == Port::Sensor;
+                    lead.strength = 0.1;
                     if let Some(candidate) = candidate(&spec, &lead, &arguments, &recordings) {
                         let names: BTreeSet<&String> = candidate.names.iter().collect();
                         assert_eq!(names.len(), candidate.names.len(), "{names:?}");
