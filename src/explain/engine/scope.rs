@@ -53,7 +53,8 @@ impl Scope {
         })
     }
 
-    fn allows(&self, id: &str) -> bool {
+    /// Whether this id may be named.
+    pub fn allows(&self, id: &str) -> bool {
         (self.only.is_empty() || self.only.iter().any(|o| o == id))
             && !self.without.iter().any(|w| w == id)
     }

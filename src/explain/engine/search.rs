@@ -377,6 +377,8 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
         .collect();
     let mut fitted = finished(fitted, study, fit, recordings, options);
     fitted.retain(|f| f.gain <= NEEDED || f.gain_without_few(study, fit, options) > NEEDED);
+    // Values of the fit may make another name of a term.
+    fitted.retain(|f| scope.allows(named(&plant.spec, f)));
     let mut origins = vec![fit];
     origins.extend(tried.iter().skip(1).map(|(_, white)| white));
     let ground = Ground {
