@@ -6,6 +6,7 @@ pub(crate) mod curve;
 pub(crate) mod documentation;
 pub(crate) mod edit;
 mod eliminate;
+mod finish;
 pub(crate) mod fitted;
 pub(crate) mod holdout;
 pub(crate) mod hypothesis;

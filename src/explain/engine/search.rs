@@ -5,11 +5,11 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::candidate::{Candidate, candidate};
 use super::eliminate::alone;
+use super::finish::finished;
 use super::fitted::{Fitted, TIE, order, searched, with_more};
 use super::holdout::HeldOut;
 use super::hypothesis::{Ground, Trial, trials};
-use super::library::Starts;
-use super::names::{SPECIFIC, family, named, rank, rank_of};
+use super::names::{SPECIFIC, family, named, rank_of};
 use super::scope::Scope;
 use super::screen::{Lead, Screen, screen};
 use crate::physics::estimate::{
@@ -36,22 +36,13 @@ const GLANCED_STEPS: usize = 20;
 pub(super) const MOST_STEPS: usize = 60;
 /// The best of these are fitted with a noise model of their own, and the best of them until nothing changes.
 const FITTED: usize = 5;
-const FINISHED: usize = 4;
-/// ... and names that gain this part of the best.
-const HALF: f64 = 0.5;
+pub(super) const FINISHED: usize = 4;
 pub(super) const THOROUGH: Effort = Effort {
     iterations: 20,
     settled: 0.05,
     attempts: 8,
 };
 pub(super) const ROUNDS: usize = 2;
-/// Times of a change that are tried on either side, and no step of a fit.
-const TIMES: usize = 10;
-const AS_IT_IS: Effort = Effort {
-    iterations: 0,
-    settled: 0.0,
-    attempts: 0,
-};
 /// Gain in Schwarz's criterion that is needed, beyond the penalty for what was searched: odds of e^8 (math/physics.md).
 pub(crate) const NEEDED: f64 = 16.0;
 /// A name is given where the gain is at least this; between [`NEEDED`] and this the place is given, and the best term as a
@@ -62,7 +53,7 @@ const FORETOLD: f64 = 0.25;
 /// A second effect must gain more, and at least this part of the first.
 pub(super) const SECOND: (f64, f64) = (30.0, 0.12);
 /// Level of the test that asks for one: of all score tests together.
-const LEFT: f64 = 0.01;
+pub(crate) const LEFT: f64 = 0.01;
 /// A better fit of the plant itself is taken from here on, and so often at most.
 const BETTER: f64 = 1.0;
 const BETTER_FITS: usize = 2;
@@ -393,74 +384,6 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     order(&plant.spec, &mut fitted);
     (fitted, strongest)
-}
-
-/// A fit with the time of its change moved where that is better: between the times that were tested there are more optima than
-/// one, and descent ends in the nearest.
-fn at_its_time(study: &Study, f: &Fitted) -> Fit {
-    let mut best = f.fit.clone();
-    let first = study.parameters() - f.candidate.values.len();
-    for (i, shape) in f.lead.term.shapes.iter().enumerate() {
-        let Starts::Length(parts) = shape.starts else {
-            continue;
-        };
-        if shape.positive {
-            continue;
-        }
-        let apart = study.duration() * (parts[1] - parts[0]);
-        let from = f.fit.point[first + i];
-        for k in 1..=TIMES {
-            for sign in [-1.0, 1.0] {
-                let mut trial = f.fit.clone();
-                trial.point[first + i] = from + sign * apart * k as f64 / TIMES as f64;
-                if let Some(moved) = study.refit(&trial, 0, AS_IT_IS)
-                    && moved.deviance < best.deviance
-                {
-                    best = moved;
-                }
-            }
-        }
-    }
-    best
-}
-
-/// The best of all fits, fitted until nothing changes; the others as they are. Best first.
-fn finished(
-    mut fitted: Vec<Fitted>,
-    study: &Study,
-    before: &Fit,
-    recordings: &[PlantRecording],
-    options: &EstimateOptions,
-) -> Vec<Fitted> {
-    fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let best = fitted.first().map_or(0.0, |f| f.gain);
-    let spec = &study.plant().spec;
-    let refined: Vec<Option<Fit>> = fitted
-        .par_iter()
-        .enumerate()
-        .map(|(i, f)| {
-            // A name must not lose to a curve for the steps that its fit lacks.
-            let named = rank(spec, f) < SPECIFIC && f.gain > HALF * best && i < 2 * FINISHED;
-            if i >= FINISHED && !named {
-                return None;
-            }
-            let options = with_more(options, f.candidate.values.len());
-            let limited = f.candidate.plant.clone().with_most_steps(MOST_STEPS);
-            let inner = study.of(&limited, &options).ok()?;
-            inner.refit(&at_its_time(&inner, f), ROUNDS, THOROUGH)
-        })
-        .collect();
-    for (f, refined) in fitted.iter_mut().zip(refined) {
-        let Some(refined) = refined else { continue };
-        if refined.criterion < f.fit.criterion {
-            f.gain = before.criterion - refined.criterion - searched(&f.lead, recordings);
-            let first = options.free.len();
-            f.shapes = refined.point[first..][..f.lead.shapes.len()].to_vec();
-            f.fit = refined;
-        }
-    }
-    fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    fitted
 }
 
 /// The second of two effects alone where the first is of no use beside it: both together gain less over it than a second

@@ -12,7 +12,7 @@ use super::engine::holdout::{HeldOut, blocks};
 use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
 use super::engine::library::Port;
 use super::engine::scope::Scope;
-use super::engine::search::{Found, SURE, chance};
+use super::engine::search::{Found, LEFT, SURE, chance};
 use super::engine::select::{CHANCE, select};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
@@ -264,12 +264,12 @@ impl Answer<'_> {
             },
             parameters,
             remaining: Remaining {
-                adequate: p_value >= CHANCE,
+                adequate: p_value >= LEFT,
                 p_value,
                 share: statistic / self.base.count().max(1) as f64,
                 share_of_removed: None,
                 features: tests,
-                sentence: if p_value >= CHANCE {
+                sentence: if p_value >= LEFT {
                     format!("None of {tests} score tests finds structure in what is left.")
                 } else {
                     format!(
