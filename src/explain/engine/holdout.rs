@@ -143,7 +143,7 @@ pub(super) fn held_out(
                 let samples = recording.outputs.first()?.len();
                 let out = block(samples, fold);
                 for range in [0..out.start, out.end..samples] {
-                    if range.len() > 0 {
+                    if !range.is_empty() {
                         kept_start.extend(at(r, range.start));
                         kept.push(cut(recording, range));
                     }
