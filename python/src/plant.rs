@@ -1,6 +1,5 @@
 //! Plants in equations.
 
-use innovant::log::Log;
 use innovant::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate, evaluate};
 use innovant::physics::{
     Excitation, Hold, OperatingPoint, Plant as Core, Point, VariableId, diagnose, render_all,
