@@ -1,4 +1,4 @@
-//! State-space models with honest uncertainty from recordings, also in closed loop.
+//! State-space models with uncertainty from recordings, in open or closed loop.
 //!
 //! Given samples of the inputs `u` and outputs `y` of a plant, find
 //!
@@ -9,7 +9,7 @@
 //!
 //! together with the covariance of `A, B, K, C, D`, what follows from it for everything that does not depend on
 //! the choice of the state (frequency response, poles, zeros, step response), and tests that tell whether the
-//! model is to be believed. `e` is the *innovation*: what a model could not foresee.
+//! model is to be believed. `e` is the *innovation*: the part of the output that the past does not predict.
 //!
 //! ```
 //! use innovant::{Options, identify, systems};
@@ -43,8 +43,8 @@
 //! | [`identify`](mod@identify) | windows, order, methods, polish to maximum likelihood, the [`Model`] |
 //! | [`model`] | what a state-space system does: simulate, predict, frequency response, poles, zeros |
 //! | [`covariance`] | the covariance of the parameters, and of what follows from them |
-//! | [`validate`] | fit, and residual tests that stay honest in closed loop and under coloured noise |
-//! | [`explain`](mod@explain) | what a simulation leaves out: located, named, fitted, proved |
+//! | [`validate`] | fit, and residual tests that hold their level in closed loop and under coloured noise |
+//! | [`explain`](mod@explain) | what a simulation lacks: located, named, fitted, checked on held-out blocks |
 //! | [`batch`] | many logs, a model of each: parallel, resumable |
 //! | [`report`] | JSON documents with their schema, tables for people |
 //! | [`reproduce`] | the papers' experiments, run again, beside what the papers print |

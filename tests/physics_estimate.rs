@@ -1,7 +1,7 @@
 //! Coverage of the intervals of plants in equations, on recordings drawn by an integrator of this file.
 //!
-//! `INNOVANT_PLANT_RUNS=200 cargo test --release --test physics_estimate -- --nocapture` draws more, and holds the bounds of the
-//! README.
+//! `INNOVANT_PLANT_RUNS=200 cargo test --release --test physics_estimate -- --nocapture` draws more, and checks the bounds of
+//! `docs/accuracy.md`.
 
 use innovant::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
 use innovant::physics::{Hold, Plant, parse};

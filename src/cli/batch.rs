@@ -27,22 +27,22 @@ Exit codes: 0 every log has a model; 1 some have none (the summary and standard 
 
 /// Identify a model of each of many logs, in parallel; resumable
 ///
-/// The logs are independent of each other: one model a log. (Several experiments of one plant give one model with
-/// `innovant identify`.) A log that cannot be identified does not stop the others.
+/// The logs are independent: one model per log. (For one model from several experiments, use `innovant identify`.) A log
+/// that cannot be identified does not stop the others.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(super) struct Flags {
     /// Logs: CSV, also gzipped
     #[arg(value_name = "LOG", required = true)]
     logs: Vec<PathBuf>,
-    /// Where the models and the summary go; made if it is not there
+    /// Folder for the models and the summary; created if missing
     #[arg(short, long, value_name = "DIR")]
     output_dir: PathBuf,
     #[command(flatten)]
     roles: RoleFlags,
     #[command(flatten)]
     model: ModelFlags,
-    /// Identify again also what is there already
+    /// Identify all logs again, also those that have a model already
     #[arg(long)]
     again: bool,
 }

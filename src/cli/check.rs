@@ -12,10 +12,10 @@ use crate::report::text::plant_text;
 const EXAMPLE: &str = "Example:
   innovant check plant.mo";
 
-/// Check a plant in equations: what is read, units, the order of the equations, an equilibrium
+/// Check a plant in equations: declarations, units, order of the equations, an equilibrium
 ///
-/// The text is flat Modelica: parameters, inputs, outputs, variables, equations. Errors name line and column and say what to
-/// write instead.
+/// The text is flat Modelica: parameters, inputs, outputs, variables, equations. Errors name the line and the column, and say
+/// what to write instead.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(super) struct Flags {

@@ -10,7 +10,7 @@ const EXAMPLE: &str = "Examples:
   innovant effects                    ids and titles
   innovant effects quadratic_drag     equation, what imitates it, which recording separates them
 
-The first list is for simulations that are plants in equations (.mo), the second for linear models and columns of outputs.";
+The first list is for plants in equations (.mo), the second for linear models and columns of outputs.";
 
 /// List the effects that `explain` can name, or describe one of them
 #[derive(Debug, Args)]

@@ -24,9 +24,10 @@ const EXAMPLE: &str = "Examples:
   innovant simulate explanation.json new_input.csv --output prediction.csv
   innovant explain recording.csv --simulation plant.mo --hypothesis 'drag: m*der(v) += -c*v*abs(v), c > 0'
 
-The simulation is a CSV of its outputs on the recorded inputs (one file a recording, in the same order; compared by time,
-on a grid of its own if that is finer), one linear model as JSON ({\"A\":..,\"B\":..,\"C\":..,\"D\":..,\"dt\":..}, or what `innovant identify` writes), or
-a plant in equations (.mo), whose parameters may differ within their bounds.
+The simulation is one of:
+  CSV   its outputs for the recorded inputs; one file per recording, in the same order, aligned by time
+  JSON  a linear model, {\"A\":..,\"B\":..,\"C\":..,\"D\":..,\"dt\":..} or what `innovant identify` writes
+  .mo   a plant in equations, whose parameters may differ within their bounds
 
 Effects (for --without; `innovant effects` describes them, and lists those of plants in equations):
   coulomb_friction stribeck_friction quadratic_drag cubic_stiffness quadratic_stiffness end_stop hysteresis
@@ -35,39 +36,39 @@ Effects (for --without; `innovant effects` describes them, and lists those of pl
   sensor_dropout sensor_outliers sensor_wrap swapped_outputs clock_drift
   periodic_disturbance load_step extra_mode missing_input gain_change stiffness_change mass_change tank_outflow
   orifice_flow overflow radiation state_of_charge gravity_torque valve_stiction input_curve law;
-  of drives also cogging direction_dependent_friction
+  for drives also cogging direction_dependent_friction
 
-Exit codes: 0 the simulation agrees with the recording; 1 something is missing in it; 2 an error.
-With --output or --report the exit code is 0 whatever was found, unless --exit-code is given.";
+Exit codes: 0 the simulation agrees with the recording; 1 it lacks something; 2 an error.
+With --output or --report the exit code is 0 also if it lacks something, unless --exit-code is given.";
 
-/// Say what a simulation leaves out: where it differs from the recording, which physics is missing, and the proof
+/// Say what a simulation leaves out: where it differs from the recording, which physics it lacks, and the evidence
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(super) struct Flags {
     /// Recordings: CSV, also gzipped; `-` is standard input
     #[arg(value_name = "LOG", required = true)]
     logs: Vec<Source>,
-    /// Simulated outputs (CSV, one file a recording), a linear model (JSON), or a plant in equations (.mo)
+    /// Simulated outputs (CSV, one file per recording), a linear model (JSON), or a plant in equations (.mo)
     #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
     simulation: Vec<PathBuf>,
     #[command(flatten)]
     roles: RoleFlags,
-    /// Which simulated output is which recorded one, when their names differ: SIMULATED=RECORDED, comma-separated
+    /// Names of simulated outputs that differ from the recorded ones: SIMULATED=RECORDED, comma-separated
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     map: Vec<String>,
-    /// Inputs of a plant in equations between samples [default: zero]
+    /// Inputs of a plant in equations between samples [default: zero, a zero-order hold]
     #[arg(long, value_enum)]
     hold: Option<HoldFlag>,
-    /// Leave effects out of the library, comma-separated ids
+    /// Effects to remove from the library, comma-separated ids
     #[arg(long, value_name = "IDS", value_delimiter = ',')]
     without: Vec<String>,
-    /// Try only these effects, comma-separated ids; for plants in equations
+    /// Effects to try, and no others, comma-separated ids; for plants in equations
     #[arg(long, value_name = "IDS", value_delimiter = ',')]
     only: Vec<String>,
-    /// A term that may be missing in a plant in equations, or a file with one a line; may be repeated
+    /// A term that a plant in equations may lack, or a file with one per line; can be repeated
     ///
     /// It is fitted beside the library and reported whether it wins or not. NAME: LEFT += EXPRESSION [, BOUND]...: LEFT is a
-    /// left-hand side of the plant (`m*der(v)`), a variable, an input or a parameter; `-=` takes a term away, `=` replaces
+    /// left-hand side of the plant (`m*der(v)`), a variable, an input or a parameter; `-=` subtracts a term, `=` replaces
     /// the right-hand side. New names in the expression are parameters; bounds are `c > 0`, `0 < c < 3`, a start value is
     /// `c = 0.1`, a unit `c [N.s/m]`. `@FILE` is a file; `#` begins a comment in it.
     #[arg(long, value_name = "TEXT")]
@@ -78,10 +79,10 @@ pub(super) struct Flags {
     /// Write the explanation to this file, as JSON
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Write a page with pictures to this file, as HTML
+    /// Write an HTML page with plots to this file
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Exit with 1 when something is missing in the simulation, also with --output or --report
+    /// Exit with 1 if the simulation lacks something, also with --output or --report
     #[arg(long)]
     exit_code: bool,
 }

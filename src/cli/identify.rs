@@ -22,8 +22,8 @@ use crate::validate::{TestedModel, Validation, identify_and_test};
 const EXAMPLE: &str = "Examples:
   innovant identify log.csv                        columns u* are inputs, y* outputs, t is time
   innovant identify log.csv.gz --inputs voltage --outputs speed,current --output model.json
-  innovant identify log.csv --report page.html     pictures, in one file that opens offline
-  innovant identify first.csv second.csv           two experiments of one plant
+  innovant identify log.csv --report page.html     plots, in one file that opens offline
+  innovant identify first.csv second.csv           two experiments with one plant
   innovant identify log.csv --order 2..8           compare orders
   innovant identify log.csv --structure plant.mo --output plant.json    parameters of your own equations
   innovant identify log.csv --simulator 'python3 simulator.py {input} {output} {parameters}' \\
@@ -32,8 +32,8 @@ const EXAMPLE: &str = "Examples:
 
 /// Identify a state-space model with its uncertainty from recordings
 ///
-/// Order and windows are chosen from the recordings unless given. Recordings may be in closed loop. Several are
-/// experiments of one plant: same columns, same sampling.
+/// Order and windows are chosen from the recordings unless you give them. Recordings may be in closed loop. Several
+/// recordings are experiments with one plant: same columns, same sampling.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(super) struct Flags {
@@ -51,9 +51,8 @@ pub(super) struct Flags {
     /// Write the model to this file, as JSON; `-` is standard output (then without the table)
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Write a page to this file, as HTML: verdict, order, frequency response, poles, step response, residuals and the
-    /// recording, with pictures (of a plant: parameters, recorded and simulated outputs, residuals, equations); `-` is
-    /// standard output
+    /// Write an HTML page with plots to this file: verdict, order, frequency response, poles, step response, residuals and the
+    /// recording (for a plant: parameters, recorded and simulated outputs, residuals, equations); `-` is standard output
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
 }

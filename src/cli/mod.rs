@@ -1,9 +1,9 @@
 //! The command line: one file a subcommand.
 //!
 //! Flags are parsed by clap into one type and then checked into a second, which says what to do without any
-//! further question (as ripgrep does). Exit codes: 0 done, 1 the model was rejected, 2 an error, told in one
-//! message on standard error. When the reader of standard output has gone (`innovant ... | head`), the work
-//! counts as done.
+//! further question (as ripgrep does). Exit codes: 0 done, 1 the model was rejected, 2 an error, with one
+//! message on standard error. If the reader of standard output has gone (`innovant ... | head`), the command
+//! succeeds.
 
 mod align;
 mod batch;
@@ -43,18 +43,18 @@ use resources::Resources;
 
 /// What is said above the list of commands.
 const ABOUT: &str =
-    "State-space models with honest uncertainty from recordings, also in closed loop";
+    "State-space models with uncertainty from recordings, in open or closed loop";
 
 /// What is said below it.
 const EXAMPLE: &str = "Example:
   innovant identify log.csv --output model.json    columns u* are inputs, y* outputs, t is time
   innovant validate model.json fresh.csv           does the model hold on another recording?
-  innovant explain log.csv --simulation sim.csv    what did the simulation leave out?
+  innovant explain log.csv --simulation sim.csv    what does the simulation lack?
   innovant simulate model.json input.csv > out.csv
   innovant show model.json
   innovant identify log.csv --structure plant.mo   parameters of your own equations
-  innovant batch logs/*.csv --output-dir models     a model of each of many logs
-  innovant reproduce all                           the papers' tables and figures, run again
+  innovant batch logs/*.csv --output-dir models    a model of each of many logs
+  innovant reproduce all                           tables and figures of three papers, computed again
 
 Exit codes: 0 done; 1 the model or simulation was rejected; 2 an error.";
 
@@ -72,10 +72,10 @@ struct Cli {
 /// How much is said.
 #[derive(Debug, Clone, Copy, Args)]
 struct Verbosity {
-    /// Say nothing but errors: no table, no progress, no notes
+    /// Print errors only: no table, no progress, no notes
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
-    /// Say on standard error what is being done
+    /// Report progress in words on standard error
     #[arg(short, long, global = true)]
     verbose: bool,
 }

@@ -22,22 +22,22 @@ pub(super) struct ModelFlags {
     /// Algorithm
     #[arg(long, value_enum, default_value = "pbsid-opt")]
     method: Method,
-    /// Step that estimates K in the place of the method's own
+    /// Step that estimates K, instead of the one of the method
     #[arg(long, value_enum)]
     stochastic: Option<Stochastic>,
-    /// Weight of the singular value decomposition [default: what suits the method]
+    /// Weight of the singular value decomposition [default: depends on the method]
     #[arg(long, value_enum)]
     weight: Option<WeightFlag>,
-    /// Polish to maximum likelihood: auto does for pbsid-opt, when the past window is long enough for it
+    /// Refine the estimate to maximum likelihood; auto does so for pbsid-opt if the past window is long enough
     #[arg(long, value_enum, default_value = "auto")]
     polish: PolishFlag,
-    /// Covariance: from the model, or robust against a model that is not right (from blocks of the data)
+    /// Covariance: from the model, or robust against a wrong model (jackknife over blocks of the data)
     #[arg(long, value_enum, default_value = "model")]
     covariance: CovarianceFlag,
-    /// What is taken out of each channel first
+    /// What to subtract from each channel first
     #[arg(long, value_enum, default_value = "mean")]
     detrend: DetrendFlag,
-    /// Estimate D: an input acts on an output in the same sample
+    /// Estimate D, the direct feedthrough: an input acts on an output in the same sample
     #[arg(long)]
     feedthrough: bool,
     /// Known delay of the inputs in samples: one for all, or one for each
@@ -48,10 +48,10 @@ pub(super) struct ModelFlags {
         allow_negative_numbers = true
     )]
     delay: Vec<u32>,
-    /// A stable model, guaranteed; the summary says what it cost
+    /// Enforce a stable model; the summary says what that costs
     #[arg(long)]
     stable: bool,
-    /// Seed of random draws
+    /// Seed of the random numbers
     #[arg(long, default_value_t = 0)]
     seed: u64,
 }

@@ -17,24 +17,24 @@ const EXAMPLE: &str = "Examples:
   innovant reproduce van-wingerden-1 --output-dir pages
   innovant reproduce all --runs 200 --threads 2
 
-Each experiment writes NAME.html (a page with the figures of the paper), NAME.csv (all numbers) and NAME.json (all of
-it), and prints what the paper says, what is found here, and whether they agree. The same seed gives the same files,
-with any number of threads.";
+Each experiment writes NAME.html (a page with the figures of the paper), NAME.csv (all numbers) and NAME.json
+(everything). It prints what the paper says, what is found here, and whether they agree. The same seed gives the
+same files, on any number of threads.";
 
-/// Run the papers' experiments again: their tables and figures beside what they print
+/// Reproduce the experiments of three papers: their tables and figures beside the printed ones
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(super) struct Flags {
-    /// Names of experiments, or `all`; without any, a list of them
+    /// Names of experiments, or `all`; without a name, a list of them
     #[arg(value_name = "EXPERIMENT")]
     experiments: Vec<String>,
-    /// Number of Monte Carlo runs [default: as many as the paper]
+    /// Number of Monte Carlo runs [default: that of the paper]
     #[arg(long, value_name = "N")]
     runs: Option<usize>,
-    /// Seed that the runs are drawn from
+    /// Seed of the runs
     #[arg(long, value_name = "SEED", default_value = "1")]
     seed: u64,
-    /// Folder for the files; it is made if need be
+    /// Folder for the files; created if missing
     #[arg(short, long, value_name = "DIR", default_value = "reproduction")]
     output_dir: PathBuf,
 }

@@ -11,7 +11,7 @@ const MOST_THREADS: i64 = 1024;
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Resources")]
 pub(super) struct Resources {
-    /// Threads [default: RAYON_NUM_THREADS, or as many as there are cores]; results do not depend on it
+    /// Number of threads; results do not depend on it [default: RAYON_NUM_THREADS, or the number of cores]
     #[arg(
         long,
         global = true,
@@ -20,7 +20,8 @@ pub(super) struct Resources {
         value_parser = clap::value_parser!(u16).range(1..=MOST_THREADS)
     )]
     threads: Option<u16>,
-    /// Refuse at once what would need more memory, such as 8G [default: INNOVANT_MEMORY, or half of the machine's]
+    /// Largest memory to use, such as 8G; a request that needs more fails at once [default: INNOVANT_MEMORY, or half of the
+    /// machine's memory]
     #[arg(long, global = true, value_name = "SIZE", value_parser = parse_size)]
     memory_limit: Option<u64>,
 }

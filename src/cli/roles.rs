@@ -17,31 +17,31 @@ pub(super) struct RoleFlags {
     /// Output columns, comma-separated [default: headers that start with y]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     outputs: Option<Vec<String>>,
-    /// Time column: numbers, dates or times of day; `none` when there is none [default: t, time, timestamp]
+    /// Time column: numbers, dates or times of day; `none` if there is none [default: t, time, timestamp]
     #[arg(long, value_name = "NAME")]
     time: Option<String>,
-    /// Sample time in seconds; rows follow each other at it, and a time column may not contradict it
+    /// Sample time in seconds; it must agree with the time column, if there is one
     #[arg(long, value_name = "SECONDS", value_parser = numbers::seconds, allow_negative_numbers = true)]
     dt: Option<f64>,
-    /// Samples that are missing, as rows or as cells [default: up to two in a row are interpolated, at more the recording is
-    /// split]
+    /// What to do with missing samples (rows or cells) [default: interpolate up to two in a row, split the recording at longer
+    /// gaps]
     #[arg(long, value_enum, value_name = "HOW")]
     missing: Option<MissingFlag>,
-    /// Put the recording on a uniform grid of this step, without aliases: for jitter and other rates
+    /// Resample to a uniform grid with this step, without aliasing: for jitter and other rates
     #[arg(long, value_name = "SECONDS", value_parser = numbers::seconds, allow_negative_numbers = true)]
     resample: Option<f64>,
-    /// Unit of the time column, whatever its header says: s, ms, us, ns, min, h or d
+    /// Unit of the time column; overrides the header: s, ms, us, ns, min, h or d
     #[arg(long, value_name = "UNIT", value_parser = time_unit)]
     time_unit: Option<TimeUnit>,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum MissingFlag {
-    /// Stop and say where
+    /// Stop with an error that says where
     Error,
-    /// Split the recording at every one
+    /// Split the recording at every gap
     Split,
-    /// Interpolate all
+    /// Interpolate every gap
     Interpolate,
 }
 

@@ -26,10 +26,10 @@ const EXAMPLE: &str = "Examples:
   innovant show plant.json --along log.csv            beside what `identify` finds in the same recording
   innovant show plant.json --format modelica > calibrated.mo";
 
-/// Show what is known of a model: poles, zeros, gains, frequency response with bands
+/// Show a model: poles, zeros, gains, frequency response with bands
 ///
-/// A plant in equations is shown with its parameters, and linearised at an operating point; uncertainty is carried over
-/// from the parameters.
+/// A plant in equations is shown with its parameters and linearised at an operating point; the uncertainty follows from
+/// that of the parameters.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(super) struct Flags {
@@ -37,7 +37,7 @@ pub(super) struct Flags {
     /// `-` is standard input
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// text: tables; json: everything (of a plant in equations: its linearisation); csv: the frequency response; modelica:
+    /// text: tables; json: everything (for a plant in equations: its linearisation); csv: the frequency response; modelica:
     /// the equations with the estimated values
     #[arg(long, value_enum, default_value = "text")]
     format: Format,

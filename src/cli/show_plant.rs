@@ -31,14 +31,14 @@ const HIGHEST: f64 = 0.6;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Plant in equations")]
 pub(super) struct PlantShowFlags {
-    /// State to linearise at: equilibrium; start (the start values of the text); values by name, as `w=3,phi=0.1`, the others
-    /// being start values [default: equilibrium]
+    /// State to linearise at: equilibrium; start (the start values of the text); values by name, as `w=3,phi=0.1`, the others at
+    /// their start values [default: equilibrium]
     #[arg(long, value_name = "equilibrium|start|NAME=VALUE")]
     state: Option<String>,
     /// Inputs to linearise at, as `u=0.5` [default: 0]
     #[arg(long, value_name = "NAME=VALUE")]
     input: Option<String>,
-    /// Linearise at the means of this recording, and show beside it what `innovant identify` finds there
+    /// Linearise at the means of this recording, and show the linear model that `innovant identify` finds in it
     #[arg(long, value_name = "LOG", conflicts_with_all = ["state", "input"])]
     along: Option<Source>,
     #[command(flatten)]

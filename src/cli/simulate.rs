@@ -26,8 +26,8 @@ const EXAMPLE: &str = "Examples:
 
 /// Simulate a model on an input, in the units of the recording
 ///
-/// Input columns are found by the names that the model has for them. The outputs are the free run from the inputs
-/// alone: y = level + model(u - level), known delays applied.
+/// Input columns are found by the names in the model. The outputs are simulated from the inputs alone:
+/// y = level + model(u - level), with known delays.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(super) struct Flags {
@@ -40,9 +40,9 @@ pub(super) struct Flags {
     input: Source,
     #[command(flatten)]
     roles: RoleFlags,
-    /// State at the first sample: zero is the operating point; estimate takes the one that fits the recorded outputs
-    /// best, which the input file must then hold too; for a plant in equations also start (the start values of its text) or
-    /// values by name, as `w=3,phi=0.1` [default: zero; for a plant in equations start]
+    /// State at the first sample: zero is the operating point; estimate fits it to the recorded outputs, which the input file
+    /// must then contain; for a plant in equations also start (the start values of its text) or values by name, as
+    /// `w=3,phi=0.1` [default: zero; for a plant in equations start]
     #[arg(long, value_name = "zero|estimate|start|NAME=VALUE")]
     initial_state: Option<String>,
     /// Parameters of a plant in equations: `J=0.02,d=0.1`, or a file that `innovant identify --structure` wrote
@@ -51,7 +51,7 @@ pub(super) struct Flags {
     /// Inputs of a plant in equations between samples [default: zero]
     #[arg(long, value_enum)]
     hold: Option<HoldFlag>,
-    /// Answer of the original simulator to this input, for an explanation relative to a simulator that is not linear
+    /// Output of the original simulator for this input, for an explanation of a simulator that is not linear
     #[arg(long, value_name = "FILE")]
     simulation: Option<PathBuf>,
     /// Write the outputs to this file, as CSV; `-` is standard output

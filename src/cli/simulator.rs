@@ -28,9 +28,9 @@ const TIME_LIMIT: f64 = 60.0;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "External simulator")]
 pub(super) struct SimulatorFlags {
-    /// Estimate the parameters of this program, which simulates. It is given three files: `{input}`, CSV with time `t` and
-    /// the inputs of the log; `{output}`, CSV that it writes, with a column for each output of the log and as many rows;
-    /// `{parameters}`, a JSON object of values by name. It is run directly, without a shell, several at a time (--threads)
+    /// Estimate the parameters of this program, which simulates the plant. It gets three files: `{input}`, CSV with time `t`
+    /// and the inputs of the log; `{output}`, CSV to write, with a column for each output of the log and as many rows;
+    /// `{parameters}`, a JSON object of values by name. It runs directly, without a shell, several at a time (--threads)
     #[arg(
         long,
         value_name = "COMMAND",
@@ -38,7 +38,7 @@ pub(super) struct SimulatorFlags {
         requires = "simulator_parameters"
     )]
     simulator: Option<String>,
-    /// Its parameters: a JSON file such as {"J": {"value": 0.01, "min": 0.001, "max": 0.1, "unit": "kg.m2"}, "d": 0.02}
+    /// Parameters of the program: a JSON file such as {"J": {"value": 0.01, "min": 0.001, "max": 0.1, "unit": "kg.m2"}, "d": 0.02}
     #[arg(long, value_name = "FILE", requires = "simulator")]
     simulator_parameters: Option<PathBuf>,
     /// Stop a run of the program after this time [default: 60]

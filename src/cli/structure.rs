@@ -19,10 +19,10 @@ use crate::report::{PlantDocument, plant_fits, plant_page};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Plant in equations")]
 pub(super) struct StructureFlags {
-    /// Estimate the parameters of this plant (Modelica text) instead of a linear model
+    /// Estimate the parameters of this plant (Modelica text), instead of a linear model
     #[arg(long, value_name = "PLANT", group = "plant")]
     structure: Option<PathBuf>,
-    /// Parameters that keep the value of the text (or of --simulator-parameters), comma-separated
+    /// Parameters to keep at the value of the text (or of --simulator-parameters), comma-separated
     #[arg(
         long,
         value_name = "NAMES",
@@ -31,27 +31,27 @@ pub(super) struct StructureFlags {
         conflicts_with = "free"
     )]
     fix: Vec<String>,
-    /// Only these parameters are estimated
+    /// Parameters to estimate, and no others, comma-separated
     #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "plant")]
     free: Vec<String>,
     /// Inputs between samples
     #[arg(long, value_enum, requires = "structure", conflicts_with = "simulator")]
     hold: Option<HoldFlag>,
-    /// Noise at the outputs (free-run), or in the states (innovation: an observer predicts from sample to sample) [default: the
-    /// likelier]
+    /// Noise at the outputs (free-run: output error), or in the states (innovation: an observer predicts from sample to sample)
+    /// [default: the one with the lower BIC]
     #[arg(long, value_enum, requires = "structure", conflicts_with = "simulator")]
     form: Option<FormFlag>,
-    /// Fit the free run by least squares, as if its error were white: closest to the recording, but with standard deviations
-    /// that are too small where the error is not white
+    /// Fit the output error by least squares, as if it were white: the closest fit to the recording, but the standard deviations
+    /// are too small if the output error is not white
     #[arg(long, requires = "plant", conflicts_with = "form")]
     least_squares: bool,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(super) enum HoldFlag {
-    /// Constant until the next sample [default]
+    /// Constant until the next sample (zero-order hold) [default]
     Zero,
-    /// On a straight line to the next sample
+    /// Linearly interpolated to the next sample
     Linear,
 }
 

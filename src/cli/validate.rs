@@ -29,10 +29,10 @@ const EXAMPLE: &str = "Examples:
 
 Exit codes: 0 accepted; 1 rejected; 2 an error.";
 
-/// Judge a model on recordings: fit, tests of the residuals, bounds
+/// Validate a model on recordings: fit, tests of the residuals, bounds
 ///
-/// Columns are found by the names that the model has for them. On the recording that it was estimated from (told by
-/// its SHA-256) the tests allow for what the estimation has fitted away, on a fresh one for the errors of the
+/// Columns are found by the names in the model. On the recording that the model was estimated from (known by its SHA-256)
+/// the tests allow for the degrees of freedom that the estimation has used, on a fresh one for the errors of the
 /// parameters.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
@@ -45,13 +45,13 @@ pub(super) struct Flags {
     logs: Vec<Source>,
     #[command(flatten)]
     roles: RoleFlags,
-    /// What is taken out of each channel first [default: as for the model, or its operating point for a fresh recording]
+    /// What to subtract from each channel first [default: as for the model, or its operating point for a fresh recording]
     #[arg(long, value_enum)]
     detrend: Option<DetrendFlag>,
-    /// Probability that a right model is rejected
+    /// Level of the tests: the probability that a correct model is rejected
     #[arg(long, default_value = "0.01", value_name = "P", value_parser = numbers::level)]
     level: f64,
-    /// How to print the result
+    /// Format of the result
     #[arg(long, value_enum, default_value = "text")]
     format: Format,
 }
@@ -70,7 +70,7 @@ enum DetrendFlag {
 enum Format {
     /// Tables
     Text,
-    /// A document
+    /// A JSON document
     Json,
 }
 

@@ -1,4 +1,4 @@
-"""State-space models with honest uncertainty from recordings, also in closed loop; and what a simulation leaves out.
+"""State-space models with uncertainty from recordings, in open or closed loop; and what a simulation lacks.
 
 >>> import innovant
 >>> u, y, dt = innovant.examples.closed_loop(2000)
