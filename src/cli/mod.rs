@@ -42,8 +42,7 @@ use crate::log::LogError;
 use resources::Resources;
 
 /// What is said above the list of commands.
-const ABOUT: &str =
-    "State-space models with uncertainty from recordings, in open or closed loop";
+const ABOUT: &str = "State-space models with uncertainty from recordings, in open or closed loop";
 
 /// What is said below it.
 const EXAMPLE: &str = "Example:
