@@ -25,7 +25,8 @@ const EXAMPLE: &str = "Examples:
   innovant explain recording.csv --simulation plant.mo --hypothesis 'drag: m*der(v) += -c*v*abs(v), c > 0'
 
 The simulation is one of:
-  CSV   its outputs for the recorded inputs; one file per recording, in the same order, aligned by time
+  CSV   its outputs for the recorded inputs; one file per recording, in the same order, aligned by time;
+        its grid may be finer
   JSON  a linear model, {\"A\":..,\"B\":..,\"C\":..,\"D\":..,\"dt\":..} or what `innovant identify` writes
   .mo   a plant in equations, whose parameters may differ within their bounds
 
