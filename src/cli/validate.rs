@@ -62,7 +62,7 @@ enum DetrendFlag {
     Level,
     /// The mean of the recording
     Mean,
-    /// The straight line through the recording
+    /// The linear trend of the recording
     Linear,
 }
 
