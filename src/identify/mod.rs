@@ -11,6 +11,7 @@
 //! | `varx` | the high-order vector ARX model | van Wingerden (22)-(23) |
 //! | `method` | which algorithm: one enum variant and one module each | |
 //! | `pbsid_opt` | states by a weighted singular value decomposition, system matrices by least squares | van Wingerden (24)-(34) |
+//! | `variance` | the covariance of an estimate in closed form | van Wingerden (35)-(41); Chiuso & Picci (3.1)-(3.5) |
 //! | `stochastic` | `K` and `Lambda` by a step of its own, for any deterministic part | |
 //! | `weighted` | the singular value decomposition that states are taken from | van Wingerden (28)-(29) |
 //! | `nested` | states from nested regressions, growing past | Chiuso & Picci; Qin & Ljung |
@@ -60,6 +61,7 @@ mod stable;
 pub mod stochastic;
 mod summary;
 mod truncation;
+pub mod variance;
 mod varx;
 mod warnings;
 mod weighted;
@@ -67,7 +69,8 @@ mod weighted;
 pub use delay::{AlignedColumns, Aligner};
 pub use error::IdentifyError;
 pub use fit::{Fit, fit};
-pub use method::{Method, Propagation};
+pub use method::Method;
+pub(crate) use model::channel_names;
 pub use model::{IdentifiedChannel, Model, identify, identify_records};
 pub use nested::{
     Nested, NestedDecomposition, Prediction, decompose_nested, nested_system_matrices,
@@ -84,6 +87,7 @@ pub use stochastic::Stochastic;
 pub use summary::{
     Asked, Diagnostics, FreeRunRest, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
 };
+pub use variance::Propagation;
 pub use varx::{Varx, varx};
 pub use warnings::of_closed_loop as warnings_of_closed_loop;
 pub use weighted::WeightedSvd;

@@ -24,6 +24,11 @@ pub struct IdentifiedChannel {
     pub delay: usize,
 }
 
+/// The names of channels.
+pub(crate) fn channel_names(channels: &[IdentifiedChannel]) -> Vec<String> {
+    channels.iter().map(|c| c.channel.name.clone()).collect()
+}
+
 /// A state-space model with what is known about its uncertainty.
 ///
 /// The system describes deviations from the levels of the channels; [`Model::simulate`] takes and gives

@@ -30,8 +30,9 @@ use super::nested::Prediction;
 use super::pbsid_opt::Weight;
 use super::source::Source;
 use super::stochastic::Stochastic;
+use super::variance::Propagation;
 use super::varx::Varx;
-use crate::covariance::{ParameterCovariance, ParameterLayout};
+use crate::covariance::ParameterCovariance;
 use crate::model::StateSpace;
 use crate::moments::RFactor;
 
@@ -334,15 +335,4 @@ pub trait Uncertain: Debug + Send + Sync {
     /// # Errors
     /// [`IdentifyError`] when those data do not allow it.
     fn replicate(&self, factor: &RFactor) -> Result<StateSpace, IdentifyError>;
-}
-
-/// First-order errors as a linear function of white noise `w` of unit covariance.
-#[derive(Debug, Clone)]
-pub struct Propagation {
-    /// How the parameters are laid out.
-    pub layout: ParameterLayout,
-    /// Errors of the parameters, `theta x w`: `Cov = P P'`.
-    pub parameters: DMatrix<f64>,
-    /// Errors of the vector ARX coefficients, `vec` of an `l x m` matrix, in the same noise.
-    pub coefficients: DMatrix<f64>,
 }

@@ -18,7 +18,8 @@ use serde::{Deserialize, Serialize};
 
 use super::error::IdentifyError;
 use super::knudsen::ResidualStep;
-use super::method::{Decomposed, Propagation, Windows};
+use super::method::{Decomposed, Windows};
+use super::variance::Propagation;
 use crate::model::StateSpace;
 use crate::moments::RFactor;
 
