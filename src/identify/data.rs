@@ -2,7 +2,7 @@
 
 use super::delay::Aligner;
 use super::error::IdentifyError;
-use super::options::Options;
+use super::options::{JACKKNIFE_BLOCKS, Options};
 use super::records::Records;
 use super::reduced::ReducedRecords;
 use crate::log::{Channel, LARGEST_SIZE};
@@ -10,9 +10,6 @@ use crate::moments::{
     BlockAccumulator, Gram, LagAccumulator, LagMoments, PanelQr, RFactor, Trend, block_grams,
 };
 
-/// Blocks of the delete-block jackknife: enough degrees of freedom for its quantiles, few enough that
-/// each is long.
-pub(super) const JACKKNIFE_BLOCKS: usize = 20;
 /// Two channels whose correlation differs from one by less are the same signal to rounding.
 const SAME_SIGNAL: f64 = 1e-12;
 /// A channel that varies by less, relative to its size, is constant to rounding.

@@ -13,9 +13,8 @@
 //!
 //! The counts are measured ones; `tests/limits.rs` holds the sum against peaks.
 
-use super::data::JACKKNIFE_BLOCKS;
 use super::error::IdentifyError;
-use super::options::Options;
+use super::options::{JACKKNIFE_BLOCKS, Options};
 use crate::covariance::numbers_of_tests;
 use crate::limits::{self, of_numbers};
 use crate::log::BLOCK_ROWS;

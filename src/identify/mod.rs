@@ -5,9 +5,11 @@
 //! | file | step | source |
 //! |---|---|---|
 //! | `records`, `delay`, `data` | recordings, streamed once, aligned, as moments | |
+//! | `options`, `algorithms` | what the user may choose | |
+//! | `fit`, `aligned` | all of it, with and without a search for dead time | |
 //! | `dead_time` | inputs that do nothing for some samples | |
 //! | `reduced` | recordings of which only moments are left: pieces of a cluster's work | |
-//! | `horizon` | past window by Akaike's criterion, future window | |
+//! | `lags`, `horizon` | windows that are asked for; past window by Akaike's criterion, future window | |
 //! | `varx` | the high-order vector ARX model | van Wingerden (22)-(23) |
 //! | `method` | which algorithm: one enum variant and one module each | |
 //! | `pbsid_opt` | states by a weighted singular value decomposition, system matrices by least squares | van Wingerden (24)-(34) |
@@ -30,6 +32,8 @@
 //! Conventions: `x[k+1] = A x[k] + B u[k] + K e[k]`, `y[k] = C x[k] + D u[k] + e[k]`; `r` inputs, `l` outputs,
 //! `n` states, `z = [u; y]`, `q = r + l`; past window `p`, future window `f <= p`, `Nc = N - p` windows.
 
+mod algorithms;
+mod aligned;
 pub mod baselines;
 mod candidate;
 mod data;
@@ -41,6 +45,7 @@ mod fit;
 mod free_run;
 mod horizon;
 pub mod knudsen;
+mod lags;
 mod memory;
 pub mod method;
 mod model;
@@ -66,10 +71,11 @@ mod varx;
 mod warnings;
 mod weighted;
 
+pub use algorithms::{Method, Stochastic};
 pub use delay::{AlignedColumns, Aligner};
 pub use error::IdentifyError;
-pub use fit::{Fit, fit};
-pub use method::Method;
+pub use finish::Fit;
+pub use fit::fit;
 pub(crate) use model::channel_names;
 pub use model::{IdentifiedChannel, Model, identify, identify_records};
 pub use nested::{
@@ -83,7 +89,6 @@ pub use records::{FileRecords, MemoryRecords, ReadProgress, Recording, Records, 
 pub use reduced::{ReducedRecords, SAMPLES_KEPT};
 pub use resolution::CoarseChannel;
 pub use source::Source;
-pub use stochastic::Stochastic;
 pub use summary::{
     Asked, Diagnostics, FreeRunRest, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
 };

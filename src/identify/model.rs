@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::error::IdentifyError;
-use super::fit::{Fit, fit};
+use super::finish::Fit;
+use super::fit::fit;
 use super::options::Options;
 use super::records::{MemoryRecords, Recording, Records};
 use super::source::deviations;

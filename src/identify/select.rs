@@ -2,18 +2,19 @@
 
 use std::sync::Arc;
 
+use super::algorithms::Method;
 use super::candidate::{Candidate, Window, cost_p_value};
 use super::error::IdentifyError;
 use super::horizon;
 use super::memory::Sizes;
-use super::method::{Decomposed, Method, Windows};
+use super::method::{Decomposed, Windows};
 use super::options::{Options, Order};
 use super::order::{self, OrderEvidence};
 use super::pbsid_opt::{Weight, decompose};
 use super::polish::Effort;
 use super::source::Source;
 use super::truncation::LARGEST_FOR_POLISH;
-use super::varx::Varx;
+use super::varx::{Varx, varx};
 use crate::linalg::spectral_radius;
 use crate::moments::RFactor;
 
@@ -29,6 +30,26 @@ pub struct Windowed {
     pub factor: Arc<RFactor>,
     /// Vector ARX estimate.
     pub varx: Arc<Varx>,
+}
+
+/// The data of a past window, if they fit into memory.
+///
+/// # Errors
+/// [`IdentifyError::Limit`], or a window that does not fit the recordings.
+pub(super) fn windowed(
+    source: &mut Source<'_>,
+    past: usize,
+    options: &Options,
+) -> Result<Windowed, IdentifyError> {
+    Sizes {
+        past: Some(past),
+        lags: past,
+        ..source.sizes()
+    }
+    .check(options)?;
+    let factor = source.factor(past)?;
+    let varx = Arc::new(varx(&factor, options.feedthrough)?);
+    Ok(Windowed { factor, varx })
 }
 
 /// The chosen order with everything that spoke for it.

@@ -3,8 +3,6 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::polish::{Effort, Polished, polish};
-use super::varx::Varx;
 use crate::linalg::{LinalgError, eigen, spectral_radius, stabilising_observer_gain};
 use crate::model::StateSpace;
 
@@ -45,17 +43,6 @@ pub fn with_poles_inside(system: &StateSpace, radius: f64) -> Result<StateSpace,
         a: a.map(|v| v.re),
         ..system.clone()
     })
-}
-
-/// The best model found whose poles are inside the stability radius: the poles are moved in, then all
-/// parameters are polished again under the constraint.
-///
-/// # Errors
-/// [`LinalgError`] from the polish, or for a defective `A`.
-pub fn stabilised(start: &StateSpace, varx: &Varx) -> Result<Polished, LinalgError> {
-    let radius = largest_stable_radius(varx.columns);
-    let inside = with_poles_inside(start, radius)?;
-    polish(&inside, varx, Some(radius), Effort::Full)
 }
 
 /// Radius of `A - K C` beyond which a predictor counts as unstable.

@@ -1,6 +1,6 @@
 //! What a user should know before trusting a model, in plain words.
 
-use super::method::Method;
+use super::algorithms::Method;
 use super::options::{Options, Polish};
 use super::order::REFEREE_LEVEL;
 use super::resolution::{CoarseChannel, WORTH_A_WARNING};

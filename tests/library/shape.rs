@@ -20,14 +20,14 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// `src/a/b.rs` and `src/a/b/mod.rs` are `[a, b]`.
+/// `src/a/b.rs` and `src/a/b/mod.rs` are `[a, b]`, the root of the crate is `[]`.
 fn module_of(file: &Path, src: &Path) -> Vec<String> {
     let relative = file.strip_prefix(src).unwrap().with_extension("");
     let mut parts: Vec<String> = relative
         .iter()
         .map(|part| part.to_str().unwrap().to_owned())
         .collect();
-    if parts.last().is_some_and(|p| p == "mod") {
+    if ["mod", "lib", "main"].contains(&parts[parts.len() - 1].as_str()) {
         parts.pop();
     }
     parts
@@ -56,38 +56,55 @@ fn without_tests(text: &str) -> (String, BTreeSet<String>) {
     (kept, modules)
 }
 
-/// The first names of what follows `crate::`: one, or those of a list in braces.
-fn names_at(text: &str) -> Vec<String> {
-    let name = |text: &str| -> String {
-        text.chars()
-            .take_while(|c| c.is_alphanumeric() || *c == '_')
-            .collect()
-    };
-    let Some(list) = text.strip_prefix('{') else {
-        return vec![name(text)];
-    };
-    let (mut names, mut depth, mut from) = (Vec::new(), 0, 0);
-    for (at, c) in list.char_indices() {
-        match c {
-            '{' => depth += 1,
-            ',' if depth == 0 => {
-                names.push(name(list[from..at].trim_start()));
-                from = at + 1;
-            }
-            '}' if depth == 0 => {
-                names.push(name(list[from..at].trim_start()));
-                break;
-            }
-            '}' => depth -= 1,
-            _ => {}
-        }
-    }
-    names.retain(|name| !name.is_empty());
-    names
+/// A path, and what it is called from then on.
+struct Named {
+    path: Vec<String>,
+    alias: Option<String>,
 }
 
-/// Modules that a source names, from the root of the crate: `crate::..`, and `super::..` from where it stands, each with one
-/// name behind it.
+/// Adds the paths of a use tree, `a::{b, c::d as e}`, each behind `prefix`; gives what follows the tree.
+fn read_tree<'a>(text: &'a str, prefix: &[String], found: &mut Vec<Named>) -> &'a str {
+    let name = |text: &'a str| -> (String, &'a str) {
+        let end = text.find(|c: char| !(c.is_alphanumeric() || c == '_'));
+        let (name, rest) = text.split_at(end.unwrap_or(text.len()));
+        (name.to_owned(), rest)
+    };
+    if let Some(mut rest) = text.strip_prefix('{') {
+        loop {
+            rest = rest.trim_start_matches(|c: char| c.is_whitespace() || c == ',');
+            if rest.is_empty() || rest.starts_with('}') {
+                return rest.strip_prefix('}').unwrap_or(rest);
+            }
+            let before = rest.len();
+            rest = read_tree(rest, prefix, found);
+            if rest.len() == before {
+                return rest;
+            }
+        }
+    }
+    let (first, rest) = name(text);
+    if first.is_empty() {
+        return rest;
+    }
+    let mut path = prefix.to_vec();
+    path.push(first);
+    match rest.strip_prefix("::") {
+        Some(inner) if inner.starts_with(|c: char| c.is_alphabetic() || c == '_' || c == '{') => {
+            read_tree(inner, &path, found)
+        }
+        _ => {
+            let (alias, rest) = match rest.strip_prefix(" as ") {
+                Some(alias) => name(alias),
+                None => (String::new(), rest),
+            };
+            let alias = Some(alias).filter(|alias| !alias.is_empty());
+            found.push(Named { path, alias });
+            rest
+        }
+    }
+}
+
+/// Paths that a source names, from the root of the crate: behind `crate::`, and behind `super::` from where it stands.
 fn paths(text: &str, module: &[String]) -> Vec<Vec<String>> {
     let mut found = Vec::new();
     let mut rest = text;
@@ -107,60 +124,88 @@ fn paths(text: &str, module: &[String]) -> Vec<Vec<String>> {
         if inside || levels > module.len() {
             continue;
         }
-        let root = if upward {
-            &module[..module.len() - levels]
-        } else {
-            &[]
-        };
-        for name in names_at(rest) {
-            let mut path = root.to_vec();
-            path.push(name);
-            found.push(path);
+        let above = if upward { module.len() - levels } else { 0 };
+        rest = read_tree(rest, &module[..above], &mut found);
+    }
+    found.into_iter().map(|named| named.path).collect()
+}
+
+/// Names that a module takes from the modules in it, each with that module.
+fn exports(text: &str) -> BTreeMap<String, String> {
+    let mut found = Vec::new();
+    for (at, _) in text.match_indices("use ") {
+        let line = text[..at].rsplit('\n').next().unwrap_or_default();
+        if line.is_empty() || line.starts_with("pub") {
+            let tree = text[at + "use ".len()..].trim_start_matches("self::");
+            read_tree(tree, &[], &mut found);
         }
     }
     found
+        .into_iter()
+        .filter(|named| named.path.len() > 1)
+        .map(|named| {
+            let last = named.path[named.path.len() - 1].clone();
+            (named.alias.unwrap_or(last), named.path[0].clone())
+        })
+        .collect()
 }
 
-/// What the modules of `src/` use of each other, tests and their fixtures apart.
-fn graph() -> Graph {
+/// What the modules in the module `root` use of each other, tests and their fixtures apart. Between the modules of `src/`
+/// links in the documentation count too; inside one of them a part may point to the function that it is a part of.
+fn graph(root: &[&str]) -> Graph {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let read: Vec<_> = sources(&src)
         .into_iter()
         .map(|file| {
             let module = module_of(&file, &src);
-            let (text, tests) = without_tests(&fs::read_to_string(&file).unwrap());
+            let (mut text, tests) = without_tests(&fs::read_to_string(&file).unwrap());
+            if !root.is_empty() {
+                let code = |line: &&str| !line.trim_start().starts_with("//");
+                text = text.lines().filter(code).collect::<Vec<_>>().join("\n");
+            }
             (file, module, text, tests)
         })
         .collect();
-    let of_tests: BTreeSet<Vec<String>> = read
+    let mut of_tests = BTreeSet::new();
+    for (_, module, _, tests) in &read {
+        of_tests.extend(tests.iter().map(|name| {
+            let mut path = module.clone();
+            path.push(name.clone());
+            path
+        }));
+    }
+    // The module in `root` that a path leads into.
+    let inside = |path: &[String]| -> Option<String> {
+        path.starts_with(&root.iter().map(ToString::to_string).collect::<Vec<_>>())
+            .then(|| path.get(root.len()).cloned())?
+    };
+    let modules: BTreeSet<String> = read.iter().filter_map(|(_, m, ..)| inside(m)).collect();
+    let exported: BTreeMap<String, String> = read
         .iter()
-        .flat_map(|(_, module, _, tests)| {
-            tests.iter().map(|name| {
-                let mut path = module.clone();
-                path.push(name.clone());
-                path
-            })
-        })
-        .collect();
-    let binary = ["lib", "main"];
-    let top: BTreeSet<&String> = read
-        .iter()
-        .map(|(_, module, ..)| &module[0])
-        .filter(|name| !binary.contains(&name.as_str()))
+        .filter(|(_, module, ..)| module == root)
+        .flat_map(|(_, _, text, _)| exports(text))
         .collect();
     let mut graph = Graph::new();
     for (file, module, text, _) in &read {
         let tested = (1..=module.len()).any(|length| of_tests.contains(&module[..length]));
-        if tested || !top.contains(&module[0]) {
+        let Some(user) = inside(module).filter(|_| !tested) else {
             continue;
-        }
+        };
         for path in paths(text, module) {
-            let used = &path[0];
-            if *used != module[0] && top.contains(used) {
-                let uses = graph.entry(module[0].clone()).or_default();
-                uses.entry(used.clone())
-                    .or_default()
-                    .insert(file.strip_prefix(&src).unwrap().to_owned());
+            let Some(name) = inside(&path) else {
+                continue;
+            };
+            let used = if modules.contains(&name) {
+                &name
+            } else if let Some(used) = exported.get(&name) {
+                used
+            } else {
+                continue;
+            };
+            if *used != user && modules.contains(used) {
+                let uses = graph.entry(user.clone()).or_default();
+                let files = uses.entry(used.clone()).or_default();
+                files.insert(file.strip_prefix(&src).unwrap().to_owned());
             }
         }
     }
@@ -192,10 +237,18 @@ fn circular(graph: &Graph) -> Vec<String> {
 
 #[test]
 fn modules_use_each_other_one_way() {
-    let graph = graph();
+    let graph = graph(&[]);
     // What is read is what there is.
     assert!(graph["identify"].contains_key("moments"), "{graph:?}");
     assert!(graph["report"].contains_key("explain"), "{graph:?}");
+    let circular = circular(&graph);
+    assert!(circular.is_empty(), "{}", circular.join("\n"));
+}
+
+#[test]
+fn modules_of_identify_use_each_other_one_way() {
+    let graph = graph(&["identify"]);
+    assert!(graph["method"].contains_key("pbsid_opt"), "{graph:?}");
     let circular = circular(&graph);
     assert!(circular.is_empty(), "{}", circular.join("\n"));
 }
@@ -208,22 +261,38 @@ fn uses_are_seen_however_they_are_written() {
         let paths = paths(&text, &module);
         paths.iter().map(|path| path.join("/")).collect()
     };
-    assert_eq!(found("use crate::log::{Log, Roles};"), ["log"]);
     assert_eq!(
-        found("use crate::{\n    log::{Log, Roles},\n    model,\n};"),
-        ["log", "model"]
+        found("use crate::log::{Log, Roles};"),
+        ["log/Log", "log/Roles"]
     );
-    assert_eq!(found("use super::super::log::Log;"), ["log"]);
-    assert_eq!(found("use super::json;"), ["report/json"]);
-    assert_eq!(found("let a: crate::model::Pole = b;"), ["model"]);
+    assert_eq!(
+        found("use crate::{\n    log::{Log, Roles},\n    model as plant,\n};\nuse crate::linalg;"),
+        ["log/Log", "log/Roles", "model", "linalg"]
+    );
+    assert_eq!(found("use super::super::log::Log;"), ["log/Log"]);
+    assert_eq!(
+        found("use super::{json, number};"),
+        ["report/json", "report/number"]
+    );
+    assert_eq!(found("use super::*;"), [""; 0]);
+    assert_eq!(
+        found("let a: Vec<crate::model::Pole> = crate::log::of(super::b::<f64>());"),
+        ["model/Pole", "log/of", "report/b"]
+    );
     assert_eq!(
         found("/// [`Log`](crate::log::Log), my_crate::log"),
-        ["log"]
+        ["log/Log"]
     );
     let tests = "#[cfg(test)]\nmod tests {\n    use crate::log::Log;\n}\nuse crate::model::Pole;";
-    assert_eq!(found(tests), ["model"]);
+    assert_eq!(found(tests), ["model/Pole"]);
     let (_, modules) = without_tests("#[cfg(test)]\npub(crate) mod fixtures;\n");
     assert_eq!(modules, BTreeSet::from(["fixtures".to_owned()]));
+    assert_eq!(
+        exports("mod a;\npub use a::{B, c::D as E};\nuse self::a::f;\n"),
+        ["B", "E", "f"]
+            .map(|name| (name.to_owned(), "a".to_owned()))
+            .into()
+    );
 }
 
 #[test]
