@@ -46,7 +46,7 @@ pub(super) struct PlantShowFlags {
 
 impl PlantShowFlags {
     /// Whether something is asked for that only plants in equations have.
-    pub fn given(&self) -> bool {
+    pub(super) fn given(&self) -> bool {
         self.state.is_some() || self.input.is_some() || self.along.is_some()
     }
 }

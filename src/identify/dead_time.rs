@@ -78,7 +78,12 @@ pub(super) struct Evidence {
 
 impl Evidence {
     /// Of a model with this evidence for its order; `scale` are the divisors of the outputs.
-    pub fn new(varx: &Varx, order: Option<&OrderEvidence>, inputs: usize, scale: &[f64]) -> Self {
+    pub(super) fn new(
+        varx: &Varx,
+        order: Option<&OrderEvidence>,
+        inputs: usize,
+        scale: &[f64],
+    ) -> Self {
         let likeliest = &varx.sum_of_squares / varx.columns as f64;
         let half = cholesky_upper(&likeliest).map_or(f64::NEG_INFINITY, |upper| {
             upper.diagonal().iter().map(|d| d.ln()).sum::<f64>()
@@ -95,7 +100,7 @@ impl Evidence {
     }
 
     /// By how much Schwarz's criterion is smaller than that of `other`; `None` where one of them is not known.
-    pub fn gain_over(&self, other: &Self) -> Option<f64> {
+    pub(super) fn gain_over(&self, other: &Self) -> Option<f64> {
         let windows = self.windows.min(other.windows) as f64;
         let criterion = |e: &Self| Some(e.schwarz? + windows * e.log_determinant);
         Some(criterion(other)? - criterion(self)?).filter(|gain| gain.is_finite())

@@ -58,7 +58,7 @@ pub struct Fit {
 }
 
 /// Everything decided before the final numbers.
-pub struct Chosen {
+pub(super) struct Chosen {
     /// Data of the past window.
     pub windowed: Windowed,
     /// The order.
@@ -94,7 +94,7 @@ pub(super) fn polish_is_used(options: &Options, candidate: &Candidate) -> bool {
 ///
 /// # Errors
 /// [`IdentifyError::NoStableModel`], or too few blocks for the jackknife.
-pub fn finish(
+pub(super) fn finish(
     options: &Options,
     data: &Data,
     source: &Source<'_>,

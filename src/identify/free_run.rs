@@ -53,7 +53,7 @@ const LONGEST_RUN: usize = 200_000;
 const HOPELESS: f64 = 4.0;
 
 /// What the free runs lead to.
-pub struct FreeRun {
+pub(super) struct FreeRun {
     /// Data of the window.
     pub windowed: Windowed,
     /// The order, with the sentence why.
@@ -68,7 +68,7 @@ pub struct FreeRun {
 ///
 /// # Errors
 /// When the decomposition fails.
-pub fn many_states(windowed: &Windowed, options: &Options) -> Result<bool, IdentifyError> {
+pub(super) fn many_states(windowed: &Windowed, options: &Options) -> Result<bool, IdentifyError> {
     Ok(matches!(options.order, Order::Auto) && proposal(windowed, options)? >= MANY)
 }
 
@@ -106,7 +106,7 @@ impl HeldOut {
 ///
 /// # Errors
 /// When reading the recordings again fails, or memory does not allow a window.
-pub fn by_free_run(
+pub(super) fn by_free_run(
     chosen: &Windowed,
     source: &mut Source<'_>,
     options: &Options,

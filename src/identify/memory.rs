@@ -95,7 +95,7 @@ impl Sizes {
     ///
     /// # Errors
     /// [`IdentifyError::Limit`].
-    pub fn check(&self, options: &Options) -> Result<(), IdentifyError> {
+    pub(super) fn check(&self, options: &Options) -> Result<(), IdentifyError> {
         limits::check(
             self.bytes(options),
             options.memory_limit,

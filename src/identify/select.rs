@@ -25,7 +25,7 @@ const LARGEST_UNIT_RATIO: f64 = 3.0;
 const NOISE_FREE: f64 = 1e-16;
 
 /// The data factor of a past window with its vector ARX model.
-pub struct Windowed {
+pub(super) struct Windowed {
     /// Data.
     pub factor: Arc<RFactor>,
     /// Vector ARX estimate.
@@ -53,7 +53,7 @@ pub(super) fn windowed(
 }
 
 /// The chosen order with everything that spoke for it.
-pub struct Selection {
+pub(super) struct Selection {
     /// The model of that order.
     pub candidate: Candidate,
     /// Singular values of the decomposition that it came from.
@@ -72,7 +72,7 @@ pub struct Selection {
 
 impl Selection {
     /// Whether the chi-square test rejects the order, over a past window that is long enough for this test.
-    pub fn rejected(&self, windowed: &Windowed) -> bool {
+    pub(super) fn rejected(&self, windowed: &Windowed) -> bool {
         let varx = &windowed.varx;
         let freedom = varx.coefficients.nrows() * varx.degrees_of_freedom();
         self.candidate.truncation <= LARGEST_FOR_POLISH
@@ -87,7 +87,7 @@ impl Selection {
 ///
 /// # Errors
 /// As [`select`].
-pub fn propose(
+pub(super) fn propose(
     windowed: &Windowed,
     options: &Options,
     source: &mut Source<'_>,
@@ -99,7 +99,7 @@ pub fn propose(
 ///
 /// # Errors
 /// [`IdentifyError::Order`] for an order that the windows do not allow.
-pub fn select(
+pub(super) fn select(
     windowed: &Windowed,
     options: &Options,
     source: &mut Source<'_>,

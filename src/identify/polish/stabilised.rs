@@ -11,7 +11,7 @@ use crate::model::StateSpace;
 ///
 /// # Errors
 /// [`LinalgError`] from the polish, or for a defective `A`.
-pub fn stabilised(start: &StateSpace, varx: &Varx) -> Result<Polished, LinalgError> {
+pub(crate) fn stabilised(start: &StateSpace, varx: &Varx) -> Result<Polished, LinalgError> {
     let radius = largest_stable_radius(varx.columns);
     let inside = with_poles_inside(start, radius)?;
     polish(&inside, varx, Some(radius), Effort::Full)
