@@ -8,7 +8,7 @@
 //! | request | who estimates |
 //! |---|---|
 //! | a model from recordings | `identify::memory` |
-//! | a recording held in memory | [`Log`](crate::log::Log), as it is read |
+//! | a recording held in memory | `log::Log`, as it is read |
 //! | what a simulation leaves out | `explain::memory` |
 
 use std::fmt;

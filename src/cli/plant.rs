@@ -29,7 +29,7 @@ pub(super) struct LoadedPlant {
 
 impl LoadedPlant {
     /// The equations with the values of the parameters.
-    pub fn modelica(&self) -> String {
+    pub(super) fn modelica(&self) -> String {
         self.plant.text_at(&self.point)
     }
 }

@@ -11,9 +11,9 @@ use super::show_plant::{self, PlantShowFlags};
 use super::terminal::style;
 use super::{Outcome, Verbosity};
 use crate::covariance::{ResponsePoint, invariants};
-use crate::identify::Model;
+use crate::identify::{Model, channel_names};
 use crate::report::text::show_text;
-use crate::report::{names, read_model, to_json};
+use crate::report::{read_model, to_json};
 
 /// Frequencies of the default grid.
 const FREQUENCIES: usize = 60;
@@ -78,8 +78,8 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     let described = invariants(
         &model.system,
         model.covariance.as_ref(),
-        &names(&model.outputs),
-        &names(&model.inputs),
+        &channel_names(&model.outputs),
+        &channel_names(&model.inputs),
         &frequencies,
         model.summary.as_ref().map_or(0, |s| s.options.seed),
     )?;

@@ -11,13 +11,12 @@ use super::show::{Format, table};
 use super::terminal::style;
 use super::{Outcome, Verbosity};
 use crate::covariance::invariants;
-use crate::identify::{Options, identify};
+use crate::identify::{Options, channel_names, identify};
 use crate::log::{Log, RoleNeed, Source};
 use crate::physics::{Excitation, OperatingPoint, OperatingPointError};
 use crate::report::text::{linearisation_text, plant_estimate_text, plant_text};
 use crate::report::{
-    IdentifiedDocument, LinearisationDocument, Uncertain, frequency_grid, logarithmic, names,
-    to_json,
+    IdentifiedDocument, LinearisationDocument, Uncertain, frequency_grid, logarithmic, to_json,
 };
 
 /// Frequencies at which plant and linear model are compared.
@@ -47,7 +46,7 @@ pub(super) struct PlantShowFlags {
 
 impl PlantShowFlags {
     /// Whether something is asked for that only plants in equations have.
-    pub fn given(&self) -> bool {
+    pub(super) fn given(&self) -> bool {
         self.state.is_some() || self.input.is_some() || self.along.is_some()
     }
 }
@@ -277,8 +276,8 @@ fn identified(
     let described = invariants(
         &model.system,
         model.covariance.as_ref(),
-        &names(&model.outputs),
-        &names(&model.inputs),
+        &channel_names(&model.outputs),
+        &channel_names(&model.inputs),
         &frequencies,
         model.summary.as_ref().map_or(0, |s| s.options.seed),
     )?;

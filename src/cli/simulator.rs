@@ -48,7 +48,7 @@ pub(super) struct SimulatorFlags {
 
 impl SimulatorFlags {
     /// Whether a simulator is given.
-    pub fn asked(&self) -> bool {
+    pub(super) fn asked(&self) -> bool {
         self.simulator.is_some()
     }
 }

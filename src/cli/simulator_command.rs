@@ -41,7 +41,7 @@ pub(super) struct SimulatorCommand {
 
 impl SimulatorCommand {
     /// Splits a command into words as a POSIX shell does; no shell runs it, so nothing else of a shell works.
-    pub fn new(
+    pub(super) fn new(
         text: &str,
         inputs: Vec<String>,
         outputs: Vec<String>,

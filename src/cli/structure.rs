@@ -72,17 +72,17 @@ enum FormFlag {
 
 impl StructureFlags {
     /// Whether a plant is to be estimated.
-    pub fn asked(&self) -> bool {
+    pub(super) fn asked(&self) -> bool {
         self.structure.is_some()
     }
 
     /// Whether noise is taken as white.
-    pub fn least_squares(&self) -> bool {
+    pub(super) fn least_squares(&self) -> bool {
         self.least_squares
     }
 
     /// Which parameters are free.
-    pub fn free_parameters(&self, plant: &dyn Simulated) -> anyhow::Result<Vec<bool>> {
+    pub(super) fn free_parameters(&self, plant: &dyn Simulated) -> anyhow::Result<Vec<bool>> {
         free(plant.spec(), self)
     }
 }

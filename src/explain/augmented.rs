@@ -12,8 +12,8 @@ use super::functionals::Functionals;
 use super::plant::{Plant, row_major};
 use super::simulation::delayed;
 use super::structure::{Direction, Instance, Signal, Structure};
+use crate::linalg::Rows;
 use crate::log::{Channel, is_sample_time};
-use crate::report::Rows;
 
 /// Why an augmented model cannot be run.
 #[derive(Debug, thiserror::Error)]

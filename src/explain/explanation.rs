@@ -6,8 +6,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::identify::Recording;
+use crate::linalg::Rows;
 use crate::log::Channel;
-use crate::report::Rows;
 
 /// Format name and version of the document.
 pub const EXPLANATION_FORMAT: &str = "innovant-explanation/1";

@@ -16,7 +16,7 @@ use super::fit::{Effort, Fit, Problem};
 use super::plant::Plant;
 use super::search::Ranked;
 use super::structure::{Direction, Instance, Signal, Structure};
-use crate::report::Rows;
+use crate::linalg::Rows;
 
 /// Outflow coefficient of an upper tank that is not there: it passes everything on at once.
 const OPEN: f64 = 1e9;

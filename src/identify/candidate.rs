@@ -13,7 +13,7 @@ use crate::model::StateSpace;
 
 /// A model of one order with what was learnt about it.
 #[derive(Debug, Clone)]
-pub struct Candidate {
+pub(super) struct Candidate {
     /// Order.
     pub order: usize,
     /// The estimate of the method.
@@ -31,7 +31,7 @@ pub struct Candidate {
 
 /// Everything that candidates of one past window share.
 #[derive(Debug, Clone)]
-pub struct Window {
+pub(super) struct Window {
     /// Data, with the weight; the future window depends on the order.
     pub windows: Windows,
     /// Whether candidates are polished.
@@ -45,7 +45,7 @@ impl Window {
     ///
     /// # Errors
     /// [`IdentifyError::SingularRegression`] for an order that the data do not support.
-    pub fn candidate(
+    pub(super) fn candidate(
         &self,
         decomposition: &Decomposed,
         order: usize,
@@ -62,7 +62,11 @@ impl Window {
 
     /// `candidate` polished from another start, that of a larger model without the states that matter least, where that
     /// ends lower.
-    pub fn reconsidered(&self, candidate: &Candidate, larger: &StateSpace) -> Option<Candidate> {
+    pub(super) fn reconsidered(
+        &self,
+        candidate: &Candidate,
+        larger: &StateSpace,
+    ) -> Option<Candidate> {
         let varx = &self.windows.varx;
         let start = reduced(larger, varx, candidate.order)?;
         let mut found = polish(&start, varx, None, self.effort).ok()?;
@@ -77,7 +81,7 @@ impl Window {
     }
 
     /// A candidate with which a referee was content, polished to the minimum: where a referee stops depends on rounding.
-    pub fn finished(&self, candidate: Candidate) -> Candidate {
+    pub(super) fn finished(&self, candidate: Candidate) -> Candidate {
         let Some(content) = &candidate.polished else {
             return candidate;
         };
@@ -124,7 +128,7 @@ impl Window {
 ///
 /// The cost is chi-square when the innovation covariance is known. It is estimated with
 /// `residual_degrees_of_freedom` of its own for each output, which the F distribution takes into account.
-pub fn cost_p_value(
+pub(super) fn cost_p_value(
     cost: f64,
     degrees_of_freedom: usize,
     residual_degrees_of_freedom: usize,

@@ -2,7 +2,7 @@
 
 use super::delay::Aligner;
 use super::error::IdentifyError;
-use super::options::Options;
+use super::options::{JACKKNIFE_BLOCKS, Options};
 use super::records::Records;
 use super::reduced::ReducedRecords;
 use crate::log::{Channel, LARGEST_SIZE};
@@ -10,9 +10,6 @@ use crate::moments::{
     BlockAccumulator, Gram, LagAccumulator, LagMoments, PanelQr, RFactor, Trend, block_grams,
 };
 
-/// Blocks of the delete-block jackknife: enough degrees of freedom for its quantiles, few enough that
-/// each is long.
-pub(super) const JACKKNIFE_BLOCKS: usize = 20;
 /// Two channels whose correlation differs from one by less are the same signal to rounding.
 const SAME_SIGNAL: f64 = 1e-12;
 /// A channel that varies by less, relative to its size, is constant to rounding.
@@ -20,7 +17,7 @@ const CONSTANT: f64 = 1e-13;
 
 /// Moments of all experiments, with their trends.
 #[derive(Debug)]
-pub struct Data {
+pub(super) struct Data {
     experiments: Vec<LagMoments>,
     blocks: Vec<Vec<LagMoments>>,
     trends: Vec<Trend>,
@@ -39,7 +36,7 @@ impl Data {
     ///
     /// # Errors
     /// What is wrong with a file, a constant channel, or the same signal twice.
-    pub fn read(
+    pub(super) fn read(
         records: &mut dyn Records,
         options: &Options,
         lags: usize,
@@ -237,12 +234,12 @@ impl Data {
     }
 
     /// Number of channels.
-    pub fn channels(&self) -> usize {
+    pub(super) fn channels(&self) -> usize {
         self.scale.len()
     }
 
     /// Largest past window that the moments hold.
-    pub fn lags(&self) -> usize {
+    pub(super) fn lags(&self) -> usize {
         self.experiments
             .iter()
             .map(LagMoments::lags)
@@ -251,12 +248,12 @@ impl Data {
     }
 
     /// Known delay of each input.
-    pub fn delays(&self) -> &[usize] {
+    pub(super) fn delays(&self) -> &[usize] {
         &self.delays
     }
 
     /// Trend of an experiment.
-    pub fn trend(&self, experiment: usize) -> &Trend {
+    pub(super) fn trend(&self, experiment: usize) -> &Trend {
         &self.trends[experiment]
     }
 
@@ -273,7 +270,11 @@ impl Data {
     ///
     /// # Errors
     /// When reading again fails, or is needed and only moments are left.
-    pub fn factor(&self, records: &mut dyn Records, past: usize) -> Result<RFactor, IdentifyError> {
+    pub(super) fn factor(
+        &self,
+        records: &mut dyn Records,
+        past: usize,
+    ) -> Result<RFactor, IdentifyError> {
         if let Ok(factor) = RFactor::from_gram(&self.gram(past), self.inputs, &self.scale) {
             return Ok(factor);
         }
@@ -297,7 +298,7 @@ impl Data {
 
     /// Factors of all data but one block, for each block of the jackknife. Blocks whose removal leaves an
     /// ill-conditioned rest are left out.
-    pub fn factors_without_blocks(&self, past: usize) -> Vec<RFactor> {
+    pub(super) fn factors_without_blocks(&self, past: usize) -> Vec<RFactor> {
         let whole = self.gram(past);
         self.blocks
             .iter()

@@ -8,22 +8,12 @@
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::fit::{Fit, fit_aligned};
-use super::options::Options;
 use super::order::{OrderEvidence, REFEREE_LEVEL};
-use super::records::Records;
 use super::varx::Varx;
 use crate::linalg::{cholesky_upper, solve_upper_transposed};
 
 /// Significance of the leading coefficients from which a dead time has ended.
-const LEVEL: f64 = 0.01;
-/// Criteria that differ by less are as good: "not worth more than a bare mention" (ibidem).
-const AS_GOOD: f64 = 2.0;
-/// Samples less than proposed that are tried.
-const FEWER: usize = 2;
-/// By how much Schwarz's criterion must fall: "very strong" evidence (Kass and Raftery 1995).
-const NEEDED: f64 = 10.0;
-
+pub(super) const LEVEL: f64 = 0.01;
 /// Leading lags of each input whose coefficients are jointly zero at [`LEVEL`]; 0 for an input without any significant one.
 fn proposed(varx: &Varx, inputs: usize) -> Vec<usize> {
     let none = vec![0; inputs];
@@ -79,7 +69,7 @@ pub(super) struct Evidence {
     /// Schwarz's criterion of the model against its vector ARX model, where it was computed.
     schwarz: Option<f64>,
     /// Whether the chi-square test accepts the order.
-    accepted: bool,
+    pub accepted: bool,
     /// `log det` of the innovation covariance of the vector ARX model in the user's units, by maximum likelihood.
     log_determinant: f64,
     /// Windows of the vector ARX model.
@@ -88,7 +78,12 @@ pub(super) struct Evidence {
 
 impl Evidence {
     /// Of a model with this evidence for its order; `scale` are the divisors of the outputs.
-    pub fn new(varx: &Varx, order: Option<&OrderEvidence>, inputs: usize, scale: &[f64]) -> Self {
+    pub(super) fn new(
+        varx: &Varx,
+        order: Option<&OrderEvidence>,
+        inputs: usize,
+        scale: &[f64],
+    ) -> Self {
         let likeliest = &varx.sum_of_squares / varx.columns as f64;
         let half = cholesky_upper(&likeliest).map_or(f64::NEG_INFINITY, |upper| {
             upper.diagonal().iter().map(|d| d.ln()).sum::<f64>()
@@ -105,66 +100,11 @@ impl Evidence {
     }
 
     /// By how much Schwarz's criterion is smaller than that of `other`; `None` where one of them is not known.
-    fn gain_over(&self, other: &Self) -> Option<f64> {
+    pub(super) fn gain_over(&self, other: &Self) -> Option<f64> {
         let windows = self.windows.min(other.windows) as f64;
         let criterion = |e: &Self| Some(e.schwarz? + windows * e.log_determinant);
         Some(criterion(other)? - criterion(self)?).filter(|gain| gain.is_finite())
     }
-}
-
-/// The model of inputs that are shifted by the dead time that `plain` proposes, where that is clearly better.
-pub(super) fn shifted(records: &mut dyn Records, options: &Options, plain: &Fit) -> Option<Fit> {
-    let known = !options.input_delay.is_empty() || records.reduced().is_some();
-    let proposed = &plain.dead_time.proposed;
-    // The smooth beginning of a response may save a state as well, at the price of a bias: only where no order does without.
-    let known = known || plain.dead_time.accepted;
-    if known || proposed.iter().all(|d| *d == 0) {
-        return None;
-    }
-    // The first coefficients of a smooth response may be too small to be seen: fewer samples are tried as well, and the fewest
-    // that do as well are right more often than the most.
-    let mut tried: Vec<(f64, Fit)> = Vec::new();
-    for fewer in (0..=FEWER).rev() {
-        let input_delay: Vec<usize> = proposed.iter().map(|d| d.saturating_sub(fewer)).collect();
-        if input_delay.iter().all(|d| *d == 0) {
-            continue;
-        }
-        let options = Options {
-            input_delay,
-            ..options.clone()
-        };
-        let Ok(fit) = fit_aligned(records, &options) else {
-            continue;
-        };
-        if let Some(gain) = fit.dead_time.gain_over(&plain.dead_time)
-            && fit.dead_time.accepted
-        {
-            tried.push((gain, fit));
-        }
-    }
-    let most = tried.iter().map(|t| t.0).reduce(f64::max)?;
-    let (gain, mut shifted) = tried
-        .into_iter()
-        .find(|(gain, _)| *gain >= NEEDED && *gain > most - AS_GOOD)?;
-    let said: Vec<String> = records
-        .inputs()
-        .iter()
-        .zip(&shifted.delays)
-        .filter(|(_, delay)| **delay > 0)
-        .map(|(channel, delay)| format!("{} {delay} samples", channel.name))
-        .collect();
-    shifted.summary.explanation.insert(
-        0,
-        format!(
-            "dead time: {}; no coefficient of the vector ARX model is significant up to there (p > {LEVEL}), and with the input \
-             shifted order {} does what takes order {} without (Schwarz's criterion is smaller by {gain:.0}); --delay 0 \
-             leaves it out",
-            said.join(", "),
-            shifted.summary.order,
-            plain.summary.order,
-        ),
-    );
-    Some(shifted)
 }
 
 #[cfg(test)]
@@ -172,8 +112,8 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
-    use super::*;
-    use crate::identify::{MemoryRecords, Model, identify};
+    use crate::identify::aligned::fit_aligned;
+    use crate::identify::{MemoryRecords, Model, Options, identify};
     use crate::log::{Channel, Log};
 
     /// `y` follows `u` with a pole at 0.9 after `dead` samples, under slow and white noise; with `gain` a controller closes the

@@ -1,19 +1,21 @@
 //! The final model: polish or not, stability, covariance, summary, the user's units.
 
+use nalgebra::DMatrix;
+
+use super::algorithms::Method;
 use super::candidate::{Candidate, cost_p_value};
 use super::data::Data;
 use super::dead_time::Evidence;
 use super::error::IdentifyError;
-use super::fit::Fit;
-use super::method::{Estimated, Method};
+use super::method::Estimated;
 use super::options::{CovarianceKind, Options, Order, Polish};
 use super::order::OrderEvidence;
-use super::polish::{Effort, Polished, coefficient_cost, polish};
+use super::polish::{Effort, Polished, coefficient_cost, polish, stabilised};
 use super::resolution::{Stepped, coarse};
 use super::scaling;
 use super::select::{Selection, Windowed};
 use super::source::Source;
-use super::stable::{largest_stable_radius, stabilised, with_poles_inside, with_stable_predictor};
+use super::stable::{largest_stable_radius, with_poles_inside, with_stable_predictor};
 use super::summary::{
     Asked, Diagnostics, FreeRunRest, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
 };
@@ -25,6 +27,7 @@ use crate::covariance::{
 };
 use crate::linalg::spectral_radius;
 use crate::model::StateSpace;
+use crate::moments::Trend;
 
 /// Singular values that are reported.
 const SINGULAR_VALUES_KEPT: usize = 40;
@@ -33,8 +36,29 @@ const SINGULAR_VALUES_KEPT: usize = 40;
 /// then the estimate that it starts from is the poorer one by far.
 const GAIN_OVER_TRUNCATION: f64 = 10.0;
 
+/// A fitted model in the user's units.
+#[derive(Debug)]
+pub struct Fit {
+    /// System matrices.
+    pub system: StateSpace,
+    /// Covariance of the parameters.
+    pub covariance: ParameterCovariance,
+    /// Covariance of the innovations.
+    pub innovation_covariance: DMatrix<f64>,
+    /// Levels of inputs, then outputs.
+    pub levels: Vec<f64>,
+    /// Delay of each input in samples.
+    pub delays: Vec<usize>,
+    /// Trend of the first experiment.
+    pub first_trend: Trend,
+    /// How it came about.
+    pub summary: Summary,
+    /// What speaks for a dead time.
+    pub(super) dead_time: Evidence,
+}
+
 /// Everything decided before the final numbers.
-pub struct Chosen {
+pub(super) struct Chosen {
     /// Data of the past window.
     pub windowed: Windowed,
     /// The order.
@@ -70,7 +94,7 @@ pub(super) fn polish_is_used(options: &Options, candidate: &Candidate) -> bool {
 ///
 /// # Errors
 /// [`IdentifyError::NoStableModel`], or too few blocks for the jackknife.
-pub fn finish(
+pub(super) fn finish(
     options: &Options,
     data: &Data,
     source: &Source<'_>,

@@ -18,15 +18,14 @@ use rayon::prelude::*;
 use super::candidate::Candidate;
 use super::error::IdentifyError;
 use super::finish::polish_is_used;
-use super::fit::windowed;
 use super::horizon;
 use super::options::{Options, Order};
 use super::order;
 use super::pbsid_opt::{Weight, decompose};
-use super::polish::{Effort, polish};
-use super::select::{Selection, Windowed, select};
+use super::polish::{Effort, polish, stabilised};
+use super::select::{Selection, Windowed, select, windowed};
 use super::source::Source;
-use super::stable::{largest_stable_radius, stabilised};
+use super::stable::largest_stable_radius;
 use super::summary::FreeRunRest;
 use super::varx::varx;
 use crate::linalg::spectral_radius;
@@ -54,7 +53,7 @@ const LONGEST_RUN: usize = 200_000;
 const HOPELESS: f64 = 4.0;
 
 /// What the free runs lead to.
-pub struct FreeRun {
+pub(super) struct FreeRun {
     /// Data of the window.
     pub windowed: Windowed,
     /// The order, with the sentence why.
@@ -69,7 +68,7 @@ pub struct FreeRun {
 ///
 /// # Errors
 /// When the decomposition fails.
-pub fn many_states(windowed: &Windowed, options: &Options) -> Result<bool, IdentifyError> {
+pub(super) fn many_states(windowed: &Windowed, options: &Options) -> Result<bool, IdentifyError> {
     Ok(matches!(options.order, Order::Auto) && proposal(windowed, options)? >= MANY)
 }
 
@@ -107,7 +106,7 @@ impl HeldOut {
 ///
 /// # Errors
 /// When reading the recordings again fails, or memory does not allow a window.
-pub fn by_free_run(
+pub(super) fn by_free_run(
     chosen: &Windowed,
     source: &mut Source<'_>,
     options: &Options,

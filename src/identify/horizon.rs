@@ -9,14 +9,14 @@ use crate::moments::RFactor;
 /// the second-order part of the variance below a tenth.
 const SAMPLES_PER_REGRESSOR: usize = 10;
 /// Longest past window that is tried first; longer ones only when the truncation asks for them.
-pub const LONGEST_PAST: usize = 100;
+pub(super) const LONGEST_PAST: usize = 100;
 /// Longest past window that is chosen at all.
-pub const LONGEST_PAST_ON_DEMAND: usize = 250;
+pub(super) const LONGEST_PAST_ON_DEMAND: usize = 250;
 /// Future windows shorter than this lose efficiency.
 const SHORTEST_FUTURE: usize = 10;
 
 /// Longest past window for a record of `samples` samples of `channels` channels.
-pub fn longest_past(samples: usize, channels: usize, limit: usize) -> usize {
+pub(super) fn longest_past(samples: usize, channels: usize, limit: usize) -> usize {
     (samples / (SAMPLES_PER_REGRESSOR * channels + 1)).clamp(1, limit)
 }
 
@@ -25,7 +25,7 @@ pub fn longest_past(samples: usize, channels: usize, limit: usize) -> usize {
 ///
 /// One triangular factor with the newest block first holds them all: the residual of past window `p'` is
 /// what the outputs have below row `p' q`.
-pub fn akaike(factor: &RFactor, feedthrough: bool) -> Vec<(usize, f64)> {
+pub(super) fn akaike(factor: &RFactor, feedthrough: bool) -> Vec<(usize, f64)> {
     let (q, outputs) = (factor.channels(), factor.outputs);
     let past = factor.past;
     let order = factor.r.ncols();
@@ -76,7 +76,7 @@ pub fn akaike(factor: &RFactor, feedthrough: bool) -> Vec<(usize, f64)> {
 }
 
 /// The window with the smallest criterion.
-pub fn best_past(criterion: &[(usize, f64)]) -> Option<usize> {
+pub(super) fn best_past(criterion: &[(usize, f64)]) -> Option<usize> {
     criterion
         .iter()
         .min_by(|a, b| a.1.total_cmp(&b.1))
@@ -84,7 +84,7 @@ pub fn best_past(criterion: &[(usize, f64)]) -> Option<usize> {
 }
 
 /// Future window for the order decision: enough for every order that is looked at.
-pub fn future_for_order_choice(past: usize, outputs: usize, largest_order: usize) -> usize {
+pub(super) fn future_for_order_choice(past: usize, outputs: usize, largest_order: usize) -> usize {
     past.min((largest_order / outputs + 2).max(SHORTEST_FUTURE))
 }
 
@@ -92,7 +92,7 @@ pub fn future_for_order_choice(past: usize, outputs: usize, largest_order: usize
 /// long, are only told apart over a long future as well (measured on a plant with a predictor radius of
 /// 0.975: the cost of the estimate before the polish falls from thousands to twice its minimum); at least
 /// `n / l + 1`, twice over, so that the states are observable with a margin.
-pub fn future_for_order(past: usize, outputs: usize, order: usize) -> usize {
+pub(super) fn future_for_order(past: usize, outputs: usize, order: usize) -> usize {
     let observable = 2 * (order.div_ceil(outputs) + 1);
     past.min(observable.max(SHORTEST_FUTURE).max(past / 2))
 }

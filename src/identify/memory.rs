@@ -9,17 +9,16 @@
 //! - the derivative of the predictor with respect to the parameters is `l p q x P`, and the regression on it holds
 //!   [`DERIVATIVES`] of that size, with one `l p q x n^2` beside them;
 //! - the residual tests, which come after the fit, average the sensitivity of the residuals to the parameters
-//!   (`validate::sensitivity`).
+//!   (`validate::sensitivity`, within `covariance::residual_budget`).
 //!
 //! The counts are measured ones; `tests/limits.rs` holds the sum against peaks.
 
-use super::data::JACKKNIFE_BLOCKS;
 use super::error::IdentifyError;
-use super::options::Options;
+use super::options::{JACKKNIFE_BLOCKS, Options};
+use crate::covariance::numbers_of_tests;
 use crate::limits::{self, of_numbers};
 use crate::log::BLOCK_ROWS;
 use crate::moments::LagAccumulator;
-use crate::validate::numbers_of_tests;
 
 /// What the program takes for nothing: code, buffers, what is kept of small recordings.
 const BASE: u64 = 12 << 20;
@@ -96,7 +95,7 @@ impl Sizes {
     ///
     /// # Errors
     /// [`IdentifyError::Limit`].
-    pub fn check(&self, options: &Options) -> Result<(), IdentifyError> {
+    pub(super) fn check(&self, options: &Options) -> Result<(), IdentifyError> {
         limits::check(
             self.bytes(options),
             options.memory_limit,

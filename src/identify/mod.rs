@@ -5,12 +5,15 @@
 //! | file | step | source |
 //! |---|---|---|
 //! | `records`, `delay`, `data` | recordings, streamed once, aligned, as moments | |
+//! | `options`, `algorithms` | what the user may choose | |
+//! | `fit`, `aligned` | all of it, with and without a search for dead time | |
 //! | `dead_time` | inputs that do nothing for some samples | |
 //! | `reduced` | recordings of which only moments are left: pieces of a cluster's work | |
-//! | `horizon` | past window by Akaike's criterion, future window | |
+//! | `lags`, `horizon` | windows that are asked for; past window by Akaike's criterion, future window | |
 //! | `varx` | the high-order vector ARX model | van Wingerden (22)-(23) |
 //! | `method` | which algorithm: one enum variant and one module each | |
 //! | `pbsid_opt` | states by a weighted singular value decomposition, system matrices by least squares | van Wingerden (24)-(34) |
+//! | `variance` | the covariance of an estimate in closed form | van Wingerden (35)-(41); Chiuso & Picci (3.1)-(3.5) |
 //! | `stochastic` | `K` and `Lambda` by a step of its own, for any deterministic part | |
 //! | `weighted` | the singular value decomposition that states are taken from | van Wingerden (28)-(29) |
 //! | `nested` | states from nested regressions, growing past | Chiuso & Picci; Qin & Ljung |
@@ -29,6 +32,8 @@
 //! Conventions: `x[k+1] = A x[k] + B u[k] + K e[k]`, `y[k] = C x[k] + D u[k] + e[k]`; `r` inputs, `l` outputs,
 //! `n` states, `z = [u; y]`, `q = r + l`; past window `p`, future window `f <= p`, `Nc = N - p` windows.
 
+mod algorithms;
+mod aligned;
 pub mod baselines;
 mod candidate;
 mod data;
@@ -40,6 +45,7 @@ mod fit;
 mod free_run;
 mod horizon;
 pub mod knudsen;
+mod lags;
 mod memory;
 pub mod method;
 mod model;
@@ -60,14 +66,17 @@ mod stable;
 pub mod stochastic;
 mod summary;
 mod truncation;
+pub mod variance;
 mod varx;
 mod warnings;
 mod weighted;
 
+pub use algorithms::{Method, Stochastic};
 pub use delay::{AlignedColumns, Aligner};
 pub use error::IdentifyError;
-pub use fit::{Fit, fit};
-pub use method::{Method, Propagation};
+pub use finish::Fit;
+pub use fit::fit;
+pub(crate) use model::channel_names;
 pub use model::{IdentifiedChannel, Model, identify, identify_records};
 pub use nested::{
     Nested, NestedDecomposition, Prediction, decompose_nested, nested_system_matrices,
@@ -80,10 +89,10 @@ pub use records::{FileRecords, MemoryRecords, ReadProgress, Recording, Records, 
 pub use reduced::{ReducedRecords, SAMPLES_KEPT};
 pub use resolution::CoarseChannel;
 pub use source::Source;
-pub use stochastic::Stochastic;
 pub use summary::{
     Asked, Diagnostics, FreeRunRest, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
 };
+pub use variance::Propagation;
 pub use varx::{Varx, varx};
 pub use warnings::of_closed_loop as warnings_of_closed_loop;
 pub use weighted::WeightedSvd;

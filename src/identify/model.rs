@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::error::IdentifyError;
-use super::fit::{Fit, fit};
+use super::finish::Fit;
+use super::fit::fit;
 use super::options::Options;
 use super::records::{MemoryRecords, Recording, Records};
 use super::source::deviations;
@@ -22,6 +23,11 @@ pub struct IdentifiedChannel {
     pub level: f64,
     /// Known delay in samples (inputs).
     pub delay: usize,
+}
+
+/// The names of channels.
+pub(crate) fn channel_names(channels: &[IdentifiedChannel]) -> Vec<String> {
+    channels.iter().map(|c| c.channel.name.clone()).collect()
 }
 
 /// A state-space model with what is known about its uncertainty.

@@ -2,11 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::algorithms::{Method, Stochastic};
 use super::error::IdentifyError;
-use super::method::Method;
 use super::pbsid_opt::Weight;
-use super::stochastic::Stochastic;
 use crate::moments::Detrend;
+
+/// Blocks of the delete-block jackknife: enough degrees of freedom for its quantiles, few enough that
+/// each is long.
+pub(super) const JACKKNIFE_BLOCKS: usize = 20;
 
 /// Which state dimension.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]

@@ -3,11 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 /// Level of the chi-square test that referees the order.
-pub const REFEREE_LEVEL: f64 = 0.01;
+pub(super) const REFEREE_LEVEL: f64 = 0.01;
 /// Orders above the proposal that are tried when the test rejects it.
-pub const ORDERS_ABOVE: usize = 4;
+pub(super) const ORDERS_ABOVE: usize = 4;
 /// Largest order that is considered without being asked for.
-pub const LARGEST_AUTOMATIC_ORDER: usize = 30;
+pub(super) const LARGEST_AUTOMATIC_ORDER: usize = 30;
 
 /// What speaks for and against one order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -36,7 +36,7 @@ pub struct OrderEvidence {
 }
 
 /// Canonical correlations from the singular values of the canonically weighted decomposition.
-pub fn canonical_correlations(singular_values: &[f64], columns: usize) -> Vec<f64> {
+pub(super) fn canonical_correlations(singular_values: &[f64], columns: usize) -> Vec<f64> {
     let scale = 1.0 / (columns as f64).sqrt();
     singular_values
         .iter()
@@ -45,7 +45,7 @@ pub fn canonical_correlations(singular_values: &[f64], columns: usize) -> Vec<f6
 }
 
 /// `SVC(n) = rho_{n+1}^2 + d(n) log(N) / N`, `d(n) = n (r + 2 l)`, for `n = 1 ..= largest`.
-pub fn singular_value_criterion(
+pub(super) fn singular_value_criterion(
     correlations: &[f64],
     inputs: usize,
     outputs: usize,
@@ -70,13 +70,13 @@ pub fn singular_value_criterion(
 }
 
 /// `d(n) log(N) / N`, the price of the parameters of an order.
-pub fn penalty(order: usize, inputs: usize, outputs: usize, columns: usize) -> f64 {
+pub(super) fn penalty(order: usize, inputs: usize, outputs: usize, columns: usize) -> f64 {
     let samples = columns as f64;
     (order * (inputs + 2 * outputs)) as f64 * samples.ln() / samples
 }
 
 /// The order with the smallest criterion.
-pub fn proposal(evidence: &[OrderEvidence]) -> Option<usize> {
+pub(super) fn proposal(evidence: &[OrderEvidence]) -> Option<usize> {
     evidence
         .iter()
         .min_by(|a, b| {

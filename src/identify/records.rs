@@ -397,3 +397,62 @@ impl Records for FileRecords<'_> {
         Ok(())
     }
 }
+
+impl Records for ReducedRecords {
+    fn experiments(&self) -> usize {
+        self.experiments.len()
+    }
+
+    fn inputs(&self) -> &[Channel] {
+        &self.inputs
+    }
+
+    fn outputs(&self) -> &[Channel] {
+        &self.outputs
+    }
+
+    fn sample_time(&self) -> f64 {
+        self.sample_time
+    }
+
+    fn recordings(&self) -> Vec<Recording> {
+        self.experiments
+            .iter()
+            .map(|e| Recording {
+                name: e.name.clone(),
+                sha256: None,
+                samples: e.samples,
+                start_time: e.start_time,
+                origin: None,
+                reading: None,
+            })
+            .collect()
+    }
+
+    fn kept_samples(&self, experiment: usize) -> usize {
+        self.experiments[experiment].beginning[0].len()
+    }
+
+    fn reduced(&self) -> Option<&ReducedRecords> {
+        Some(self)
+    }
+
+    /// Only the beginning is left to be read.
+    fn read(
+        &mut self,
+        experiment: usize,
+        limit: Option<usize>,
+        sink: &mut dyn FnMut(&[&[f64]]),
+    ) -> Result<(), LogError> {
+        let samples = limit
+            .unwrap_or(usize::MAX)
+            .min(self.kept_samples(experiment));
+        let columns: Vec<&[f64]> = self.experiments[experiment]
+            .beginning
+            .iter()
+            .map(|column| &column[..samples])
+            .collect();
+        sink(&columns);
+        Ok(())
+    }
+}

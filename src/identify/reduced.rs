@@ -2,17 +2,16 @@
 //!
 //! Each machine reduces what it has; chunks of one recording are joined with [`ReducedRecords::append`], recordings
 //! with [`ReducedRecords::add`], and the result goes into [`identify_records`](super::identify_records) like any
-//! other [`Records`]. The moments carry the first and the last `lags` samples of every chunk, so chunks need no
+//! other `Records`. The moments carry the first and the last `lags` samples of every chunk, so chunks need no
 //! overlap of their own (but for known delays), and the model is that of all samples on one machine.
 
 use serde::{Deserialize, Serialize};
 
 use super::delay::Aligner;
 use super::error::IdentifyError;
-use super::fit::lags_needed;
+use super::lags::lags_needed;
 use super::options::Options;
-use super::records::{Recording, Records};
-use crate::log::{Channel, Log, LogError, check_same_channels, check_same_sampling};
+use crate::log::{Channel, Log, check_same_channels, check_same_sampling};
 use crate::moments::{LagAccumulator, LagMoments};
 
 /// Format name and version of the document.
@@ -40,26 +39,26 @@ pub const SAMPLES_KEPT: usize = 20_000;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReducedRecords {
     format: String,
-    inputs: Vec<Channel>,
-    outputs: Vec<Channel>,
-    sample_time: f64,
+    pub(super) inputs: Vec<Channel>,
+    pub(super) outputs: Vec<Channel>,
+    pub(super) sample_time: f64,
     delays: Vec<usize>,
     lags: usize,
     by_block: bool,
-    experiments: Vec<Experiment>,
+    pub(super) experiments: Vec<Experiment>,
 }
 
 /// One recording, or a part of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Experiment {
-    name: String,
-    start_time: f64,
+pub(super) struct Experiment {
+    pub(super) name: String,
+    pub(super) start_time: f64,
     /// Samples, before known delays are taken out.
-    samples: usize,
+    pub(super) samples: usize,
     /// Moments of consecutive parts; one of the whole unless blocks are wanted.
     blocks: Vec<LagMoments>,
     /// First samples as recorded, a column a channel.
-    beginning: Vec<Vec<f64>>,
+    pub(super) beginning: Vec<Vec<f64>>,
 }
 
 impl ReducedRecords {
@@ -290,65 +289,6 @@ fn whole(blocks: &[LagMoments]) -> LagMoments {
         whole = whole.append(block);
     }
     whole
-}
-
-impl Records for ReducedRecords {
-    fn experiments(&self) -> usize {
-        self.experiments.len()
-    }
-
-    fn inputs(&self) -> &[Channel] {
-        &self.inputs
-    }
-
-    fn outputs(&self) -> &[Channel] {
-        &self.outputs
-    }
-
-    fn sample_time(&self) -> f64 {
-        self.sample_time
-    }
-
-    fn recordings(&self) -> Vec<Recording> {
-        self.experiments
-            .iter()
-            .map(|e| Recording {
-                name: e.name.clone(),
-                sha256: None,
-                samples: e.samples,
-                start_time: e.start_time,
-                origin: None,
-                reading: None,
-            })
-            .collect()
-    }
-
-    fn kept_samples(&self, experiment: usize) -> usize {
-        self.experiments[experiment].beginning[0].len()
-    }
-
-    fn reduced(&self) -> Option<&ReducedRecords> {
-        Some(self)
-    }
-
-    /// Only the beginning is left to be read.
-    fn read(
-        &mut self,
-        experiment: usize,
-        limit: Option<usize>,
-        sink: &mut dyn FnMut(&[&[f64]]),
-    ) -> Result<(), LogError> {
-        let samples = limit
-            .unwrap_or(usize::MAX)
-            .min(self.kept_samples(experiment));
-        let columns: Vec<&[f64]> = self.experiments[experiment]
-            .beginning
-            .iter()
-            .map(|column| &column[..samples])
-            .collect();
-        sink(&columns);
-        Ok(())
-    }
 }
 
 #[cfg(test)]

@@ -40,7 +40,7 @@ const SAMPLES: usize = 4000;
 
 /// A channel whose samples lie on a lattice.
 #[derive(Debug, Clone)]
-pub struct Stepped {
+pub(super) struct Stepped {
     /// Index of the channel, inputs first.
     pub index: usize,
     /// Its name.
@@ -53,7 +53,7 @@ pub struct Stepped {
 ///
 /// # Errors
 /// [`IdentifyError`] when the recording can no longer be read.
-pub fn stepped(records: &mut dyn Records) -> Result<Vec<Stepped>, IdentifyError> {
+pub(super) fn stepped(records: &mut dyn Records) -> Result<Vec<Stepped>, IdentifyError> {
     let names: Vec<String> = records
         .inputs()
         .iter()
@@ -83,7 +83,7 @@ pub fn stepped(records: &mut dyn Records) -> Result<Vec<Stepped>, IdentifyError>
 ///
 /// # Errors
 /// [`LinalgError`] for a singular innovation covariance.
-pub fn coarse(
+pub(super) fn coarse(
     stepped: &[Stepped],
     varx: &Varx,
     scale: &[f64],

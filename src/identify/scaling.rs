@@ -7,7 +7,7 @@ use crate::model::StateSpace;
 
 /// The system whose inputs and outputs are in the units of the recording, when those of `system` were
 /// divided by `scale` (inputs, then outputs).
-pub fn system_in_user_units(system: &StateSpace, scale: &[f64]) -> StateSpace {
+pub(super) fn system_in_user_units(system: &StateSpace, scale: &[f64]) -> StateSpace {
     let (su, sy) = scale.split_at(system.inputs());
     StateSpace {
         a: system.a.clone(),
@@ -41,7 +41,7 @@ fn parameter_factors(layout: &ParameterLayout, scale: &[f64]) -> Vec<f64> {
 }
 
 /// The covariance of the parameters in user units.
-pub fn covariance_in_user_units(
+pub(super) fn covariance_in_user_units(
     covariance: &ParameterCovariance,
     scale: &[f64],
 ) -> ParameterCovariance {
@@ -56,7 +56,10 @@ pub fn covariance_in_user_units(
 }
 
 /// The covariance of the innovations in user units.
-pub fn innovation_in_user_units(covariance: &DMatrix<f64>, output_scale: &[f64]) -> DMatrix<f64> {
+pub(super) fn innovation_in_user_units(
+    covariance: &DMatrix<f64>,
+    output_scale: &[f64],
+) -> DMatrix<f64> {
     DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| {
         covariance[(i, j)] * output_scale[i] * output_scale[j]
     })

@@ -2,18 +2,19 @@
 
 use std::sync::Arc;
 
+use super::algorithms::Method;
 use super::candidate::{Candidate, Window, cost_p_value};
 use super::error::IdentifyError;
 use super::horizon;
 use super::memory::Sizes;
-use super::method::{Decomposed, Method, Windows};
+use super::method::{Decomposed, Windows};
 use super::options::{Options, Order};
 use super::order::{self, OrderEvidence};
 use super::pbsid_opt::{Weight, decompose};
 use super::polish::Effort;
 use super::source::Source;
 use super::truncation::LARGEST_FOR_POLISH;
-use super::varx::Varx;
+use super::varx::{Varx, varx};
 use crate::linalg::spectral_radius;
 use crate::moments::RFactor;
 
@@ -24,15 +25,35 @@ const LARGEST_UNIT_RATIO: f64 = 3.0;
 const NOISE_FREE: f64 = 1e-16;
 
 /// The data factor of a past window with its vector ARX model.
-pub struct Windowed {
+pub(super) struct Windowed {
     /// Data.
     pub factor: Arc<RFactor>,
     /// Vector ARX estimate.
     pub varx: Arc<Varx>,
 }
 
+/// The data of a past window, if they fit into memory.
+///
+/// # Errors
+/// [`IdentifyError::Limit`], or a window that does not fit the recordings.
+pub(super) fn windowed(
+    source: &mut Source<'_>,
+    past: usize,
+    options: &Options,
+) -> Result<Windowed, IdentifyError> {
+    Sizes {
+        past: Some(past),
+        lags: past,
+        ..source.sizes()
+    }
+    .check(options)?;
+    let factor = source.factor(past)?;
+    let varx = Arc::new(varx(&factor, options.feedthrough)?);
+    Ok(Windowed { factor, varx })
+}
+
 /// The chosen order with everything that spoke for it.
-pub struct Selection {
+pub(super) struct Selection {
     /// The model of that order.
     pub candidate: Candidate,
     /// Singular values of the decomposition that it came from.
@@ -51,7 +72,7 @@ pub struct Selection {
 
 impl Selection {
     /// Whether the chi-square test rejects the order, over a past window that is long enough for this test.
-    pub fn rejected(&self, windowed: &Windowed) -> bool {
+    pub(super) fn rejected(&self, windowed: &Windowed) -> bool {
         let varx = &windowed.varx;
         let freedom = varx.coefficients.nrows() * varx.degrees_of_freedom();
         self.candidate.truncation <= LARGEST_FOR_POLISH
@@ -66,7 +87,7 @@ impl Selection {
 ///
 /// # Errors
 /// As [`select`].
-pub fn propose(
+pub(super) fn propose(
     windowed: &Windowed,
     options: &Options,
     source: &mut Source<'_>,
@@ -78,7 +99,7 @@ pub fn propose(
 ///
 /// # Errors
 /// [`IdentifyError::Order`] for an order that the windows do not allow.
-pub fn select(
+pub(super) fn select(
     windowed: &Windowed,
     options: &Options,
     source: &mut Source<'_>,

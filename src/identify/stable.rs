@@ -3,14 +3,12 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::polish::{Effort, Polished, polish};
-use super::varx::Varx;
 use crate::linalg::{LinalgError, eigen, spectral_radius, stabilising_observer_gain};
 use crate::model::StateSpace;
 
 /// Largest spectral radius that counts as stable for a record of `columns` windows: a time constant as
 /// long as the record. Slower decay cannot be told from an integrator by these data.
-pub fn largest_stable_radius(columns: usize) -> f64 {
+pub(super) fn largest_stable_radius(columns: usize) -> f64 {
     (-1.0 / columns.max(10) as f64).exp()
 }
 
@@ -19,7 +17,10 @@ pub fn largest_stable_radius(columns: usize) -> f64 {
 ///
 /// # Errors
 /// [`LinalgError`] when `A` is defective.
-pub fn with_poles_inside(system: &StateSpace, radius: f64) -> Result<StateSpace, LinalgError> {
+pub(super) fn with_poles_inside(
+    system: &StateSpace,
+    radius: f64,
+) -> Result<StateSpace, LinalgError> {
     let decomposition = eigen(&system.a)?;
     let n = system.states();
     let moved: Vec<Complex64> = decomposition
@@ -47,24 +48,13 @@ pub fn with_poles_inside(system: &StateSpace, radius: f64) -> Result<StateSpace,
     })
 }
 
-/// The best model found whose poles are inside the stability radius: the poles are moved in, then all
-/// parameters are polished again under the constraint.
-///
-/// # Errors
-/// [`LinalgError`] from the polish, or for a defective `A`.
-pub fn stabilised(start: &StateSpace, varx: &Varx) -> Result<Polished, LinalgError> {
-    let radius = largest_stable_radius(varx.columns);
-    let inside = with_poles_inside(start, radius)?;
-    polish(&inside, varx, Some(radius), Effort::Full)
-}
-
 /// Radius of `A - K C` beyond which a predictor counts as unstable.
 const LARGEST_PREDICTOR_RADIUS: f64 = 0.9999;
 
 /// The system with a stable predictor: when `A - K C` has eigenvalues outside the unit circle, which noise in
 /// `K` can cause, `K` is replaced by the gain of the same noise spectrum whose predictor is stable. `None` when
 /// the predictor is stable as it is, or the gain cannot be computed.
-pub fn with_stable_predictor(
+pub(super) fn with_stable_predictor(
     system: &StateSpace,
     innovation_covariance: &DMatrix<f64>,
 ) -> Option<StateSpace> {

@@ -2,12 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::method::Method;
+use super::algorithms::{Method, Stochastic};
 use super::options::{CovarianceKind, Polish};
 use super::order::OrderEvidence;
 use super::pbsid_opt::Weight;
 use super::resolution::CoarseChannel;
-use super::stochastic::Stochastic;
 use crate::moments::{Detrend, Route};
 
 /// Akaike's criterion of one past window.

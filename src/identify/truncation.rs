@@ -10,11 +10,11 @@ use nalgebra::DMatrix;
 /// Truncation above which the polish is not tried. The truncated part of the predictor adds this much to
 /// a chi-square cost whose standard deviation is several units, so one unit is beyond detection; PBSID_opt
 /// itself tolerates about a hundred.
-pub const LARGEST_FOR_POLISH: f64 = 1.0;
+pub(super) const LARGEST_FOR_POLISH: f64 = 1.0;
 
 /// Covariance over the record of the state that the predictor of `system` makes of each past window,
 /// `sum_i At^i [B~ K] z[k-1-i]`, in the basis of `system`.
-pub fn state_covariance(system: &StateSpace, varx: &Varx) -> DMatrix<f64> {
+pub(super) fn state_covariance(system: &StateSpace, varx: &Varx) -> DMatrix<f64> {
     let (n, inputs, outputs) = (system.states(), system.inputs(), system.outputs());
     let q = inputs + outputs;
     let predictor = &system.a - &system.k * &system.c;
@@ -40,7 +40,7 @@ pub fn state_covariance(system: &StateSpace, varx: &Varx) -> DMatrix<f64> {
 ///
 /// # Errors
 /// [`LinalgError`] for a singular innovation covariance.
-pub fn truncation(
+pub(super) fn truncation(
     system: &StateSpace,
     state_covariance: &DMatrix<f64>,
     innovation_covariance: &DMatrix<f64>,
@@ -59,7 +59,7 @@ pub fn truncation(
 ///
 /// # Errors
 /// As [`truncation`].
-pub fn past_for_truncation(
+pub(super) fn past_for_truncation(
     system: &StateSpace,
     state_covariance: &DMatrix<f64>,
     innovation_covariance: &DMatrix<f64>,

@@ -1,6 +1,6 @@
 //! What a user should know before trusting a model, in plain words.
 
-use super::method::Method;
+use super::algorithms::Method;
 use super::options::{Options, Polish};
 use super::order::REFEREE_LEVEL;
 use super::resolution::{CoarseChannel, WORTH_A_WARNING};
@@ -21,7 +21,12 @@ const POOR_EXCITATION: f64 = 1e-6;
 const CLOSE_TO_THE_CIRCLE: f64 = 2.0;
 
 /// Warnings that follow from the fit alone.
-pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Options) -> Vec<String> {
+pub(super) fn of_fit(
+    summary: &Summary,
+    varx: &Varx,
+    noise_free: bool,
+    options: &Options,
+) -> Vec<String> {
     let mut out = Vec::new();
     if noise_free {
         out.push(
@@ -156,7 +161,7 @@ pub fn of_fit(summary: &Summary, varx: &Varx, noise_free: bool, options: &Option
 }
 
 /// Warnings about poles that may as well lie on the unit circle.
-pub fn of_poles(poles: &[PoleUncertainty]) -> Vec<String> {
+pub(super) fn of_poles(poles: &[PoleUncertainty]) -> Vec<String> {
     poles
         .iter()
         .filter(|p| p.pole.value.im >= 0.0)
@@ -232,14 +237,14 @@ pub fn of_closed_loop(summary: &Summary) -> Vec<String> {
 }
 
 /// The gain `K` had to be replaced.
-pub fn predictor_mirrored() -> String {
+pub(super) fn predictor_mirrored() -> String {
     "the estimated predictor was unstable, so its gain K was replaced by the stable one of the same noise spectrum: \
      the noise model is uncertain; a longer recording, a lower --order or a longer --past would settle it"
         .to_owned()
 }
 
 /// The polish ran out of steps.
-pub fn not_converged() -> String {
+pub(super) fn not_converged() -> String {
     "the polish has not converged: some combination of the parameters is hardly determined by the recording, usually \
      because the order is too high; compare lower orders with --order"
         .to_owned()

@@ -11,6 +11,7 @@
 //! | `triangular` | solves with, and the condition of, a triangular factor |
 //! | `cholesky` | upper triangular factor of a Gram matrix |
 //! | `qr` | orthogonal factorisation and least squares |
+//! | `rows` | a matrix in a document, as an array of rows |
 //! | `singular` | thin singular value decomposition, pseudo-inverse |
 //! | `eigen` | ordinary, symmetric and generalised eigenvalue problems |
 //! | `finite` | whether numbers are numbers |
@@ -28,6 +29,7 @@ mod lyapunov;
 mod product;
 mod qr;
 mod riccati;
+mod rows;
 mod singular;
 mod triangular;
 
@@ -43,6 +45,7 @@ pub use lyapunov::{discrete_lyapunov, stabilising_observer_gain};
 pub use product::{multiply, multiply_nt, multiply_tn};
 pub use qr::{least_squares, qr_r, qr_thin};
 pub use riccati::{StationaryFilter, stationary_filter};
+pub use rows::Rows;
 pub use singular::{Svd, pseudo_inverse, svd_thin};
 pub use triangular::{
     reciprocal_condition_upper, solve_upper, solve_upper_right, solve_upper_transposed,

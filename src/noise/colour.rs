@@ -42,7 +42,7 @@ struct Start<Gain> {
 
 impl Colour {
     /// `None` where the model is not stationary or not invertible.
-    pub fn new(ar: Vec<f64>, ma: Vec<f64>) -> Option<Self> {
+    pub(crate) fn new(ar: Vec<f64>, ma: Vec<f64>) -> Option<Self> {
         let reflections = reflections(&ar)?;
         let (predictors, gains) = if ma.is_empty() {
             (lower_orders(&ar, &reflections), Vec::new())
@@ -64,12 +64,12 @@ impl Colour {
         })
     }
 
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.ar.len() + self.ma.len()
     }
 
     /// `log det` of the covariance of the first `samples` values, in units of the variance of `e`.
-    pub fn log_determinant(&self, samples: usize) -> f64 {
+    pub(crate) fn log_determinant(&self, samples: usize) -> f64 {
         let predictors = self.predictors.iter().map(|s| s.scale);
         predictors
             .chain(self.gains.iter().map(|s| s.scale))
@@ -79,7 +79,7 @@ impl Colour {
     }
 
     /// Whitens one stretch, times `gain`, behind what `out` holds.
-    pub fn whiten(&self, v: &[f64], gain: f64, out: &mut Vec<f64>) {
+    pub(crate) fn whiten(&self, v: &[f64], gain: f64, out: &mut Vec<f64>) {
         if self.ma.is_empty() {
             self.whiten_autoregression(v, gain, out);
             return;

@@ -36,7 +36,7 @@ pub(crate) type Mask = Vec<Vec<bool>>;
 
 impl Noise {
     /// White and Gaussian, of size 1.
-    pub fn unit(outputs: usize) -> Self {
+    pub(crate) fn unit(outputs: usize) -> Self {
         Self {
             colours: vec![Colour::default(); outputs],
             scale: vec![1.0; outputs],
@@ -45,7 +45,7 @@ impl Noise {
     }
 
     /// White and Gaussian, of the residual's size.
-    pub fn white(residual: &Series, outputs: usize, mask: &Mask) -> Self {
+    pub(crate) fn white(residual: &Series, outputs: usize, mask: &Mask) -> Self {
         let mut noise = Self::unit(outputs);
         let squares = noise.squares(residual, mask);
         noise.fit_scale(&squares);
@@ -53,7 +53,12 @@ impl Noise {
     }
 
     /// Estimated from a residual: the colour by Schwarz's criterion among `colours`.
-    pub fn estimate(residual: &Series, outputs: usize, mask: &Mask, colours: Colours) -> Self {
+    pub(crate) fn estimate(
+        residual: &Series,
+        outputs: usize,
+        mask: &Mask,
+        colours: Colours,
+    ) -> Self {
         let mut noise = Self {
             colours: (0..outputs)
                 .map(|o| estimate::colour(residual, outputs, o, mask, colours))
@@ -68,14 +73,14 @@ impl Noise {
     }
 
     /// Numbers that the noise model has.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.colours.iter().map(Colour::len).sum::<usize>()
             + self.scale.len()
             + usize::from(self.degrees.is_finite())
     }
 
     /// Whitened and scaled series; what does not count is zero.
-    pub fn whiten(&self, series: &Series, mask: &Mask) -> Series {
+    pub(crate) fn whiten(&self, series: &Series, mask: &Mask) -> Series {
         series
             .iter()
             .zip(mask)
@@ -94,7 +99,7 @@ impl Noise {
     }
 
     /// The values that count, whitened and scaled, one series after the other.
-    pub fn whiten_kept(&self, series: &Series, mask: &Mask) -> Vec<f64> {
+    pub(crate) fn whiten_kept(&self, series: &Series, mask: &Mask) -> Vec<f64> {
         let mut out = Vec::with_capacity(mask.iter().map(Vec::len).sum());
         for (s, (column, mask)) in series.iter().zip(mask).enumerate() {
             let o = s % self.scale.len();
@@ -106,7 +111,7 @@ impl Noise {
     }
 
     /// `-2 log` density of one whitened value, but for a constant.
-    pub fn loss(&self, e: f64) -> f64 {
+    pub(crate) fn loss(&self, e: f64) -> f64 {
         if self.degrees.is_finite() {
             (self.degrees + 1.0) * (e * e / self.degrees).ln_1p()
         } else {
@@ -115,7 +120,7 @@ impl Noise {
     }
 
     /// Weight of one whitened value in a least-squares step.
-    pub fn weight(&self, e: f64) -> f64 {
+    pub(crate) fn weight(&self, e: f64) -> f64 {
         if self.degrees.is_finite() {
             (self.degrees + 1.0) / (self.degrees + e * e)
         } else {
@@ -124,7 +129,7 @@ impl Noise {
     }
 
     /// `-2 log` likelihood of a residual.
-    pub fn deviance(&self, residual: &Series, mask: &Mask) -> f64 {
+    pub(crate) fn deviance(&self, residual: &Series, mask: &Mask) -> f64 {
         let mut squares = Vec::new();
         let mut deviance = 0.0;
         for (s, (column, mask)) in residual.iter().zip(mask).enumerate() {

@@ -3,7 +3,7 @@
 //! | file             | one idea                                                          |
 //! |------------------|-------------------------------------------------------------------|
 //! | `model_document` | the keys of `innovant-model/1`                                    |
-//! | `channels`, `matrix`, `packed`, `request` | its parts                                |
+//! | `channels`, `packed`, `request` | its parts                                |
 //! | `read`           | text to model, with errors that name line, column and key         |
 //! | `json`           | how JSON is laid out; `location`: where in it something stands    |
 //! | `schema`         | the JSON Schema                                                   |
@@ -30,7 +30,6 @@ mod channels;
 mod error;
 mod json;
 mod location;
-mod matrix;
 mod model_document;
 mod overview;
 mod packed;
@@ -51,8 +50,6 @@ mod validation_document;
 pub use channels::{InputDocument, OutputDocument};
 pub use error::DocumentError;
 pub use json::to_json;
-pub use matrix::Rows;
-pub(crate) use model_document::names;
 pub use model_document::{
     DiagnosticsDocument, InvariantsDocument, MODEL_FORMAT, ModelDocument, Provenance,
 };

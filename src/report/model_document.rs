@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 use super::channels::{InputDocument, OutputDocument};
 use super::error::DocumentError;
 use super::json::to_json;
-use super::matrix::Rows;
 use super::packed::CovarianceDocument;
 use super::request::Request;
 use crate::covariance::{Root, StaticGain, invariants};
 use crate::identify::{
-    Asked, Diagnostics, Horizons, IdentifiedChannel, Method, Model, Recording, Stochastic, Weight,
+    Asked, Diagnostics, Horizons, Method, Model, Recording, Stochastic, Weight, channel_names,
 };
+use crate::linalg::Rows;
 use crate::model::Armax;
 use crate::validate::Validation;
 
@@ -181,8 +181,8 @@ impl ModelDocument {
         let described = invariants(
             system,
             covariance.as_ref(),
-            &names(outputs),
-            &names(inputs),
+            &channel_names(outputs),
+            &channel_names(inputs),
             &[],
             seed,
         )?;
@@ -259,11 +259,6 @@ impl ModelDocument {
     pub fn to_json(&self) -> Result<String, DocumentError> {
         Ok(to_json(self)?)
     }
-}
-
-/// The names of channels.
-pub(crate) fn names(channels: &[IdentifiedChannel]) -> Vec<String> {
-    channels.iter().map(|c| c.channel.name.clone()).collect()
 }
 
 fn check_finite(model: &Model) -> Result<(), DocumentError> {

@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 use super::error::{DocumentError, repeated};
 use super::json::to_json;
 use super::location::position_of;
-use super::matrix::Rows;
 use super::read::{broken, no_document};
 use super::simulator_document::SimulatorDocument;
 use crate::identify::Recording;
+use crate::linalg::Rows;
 use crate::physics::estimate::{Form, PlantEstimate, Question, ResidualTest};
 use crate::physics::{Hold, Plant, Point, Simulated, parse};
 

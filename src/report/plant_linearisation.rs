@@ -7,13 +7,12 @@ use num_complex::Complex64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::matrix::Rows;
 use super::plant_document::PlantDocument;
 use crate::covariance::{
     Covariance2, DEFECTIVE, ResponsePoint, Root, StaticGain, continuous_stds, interval_quantile,
     linear_band, projected_variance, response_point,
 };
-use crate::linalg::{LinalgError, eigen, eigenvalues};
+use crate::linalg::{LinalgError, Rows, eigen, eigenvalues};
 use crate::model::slowest_first;
 use crate::physics::{Linearisation, OperatingPlant, Plant};
 

@@ -14,6 +14,7 @@ use super::location::{offset, path_at, position_of};
 use super::model_document::{MODEL_FORMAT, ModelDocument};
 use crate::identify::{IdentifiedChannel, Model, Summary};
 use crate::limits;
+use crate::linalg::Rows;
 use crate::log::Channel;
 use crate::model::{ModelError, StateSpace};
 
@@ -204,7 +205,7 @@ fn word_at(text: &str, at: usize) -> &str {
 /// The model of a document, or the key that is wrong and why.
 fn model(document: &ModelDocument) -> Result<Model, (String, String)> {
     let wrong = |key: &str, message: String| (key.to_owned(), message);
-    let raw = |rows: &super::matrix::Rows| rows.0.clone();
+    let raw = |rows: &Rows| rows.0.clone();
     let a = raw(&document.a);
     let n = a.nrows();
     let d = document.d.as_ref().map(raw);
@@ -222,7 +223,7 @@ fn model(document: &ModelDocument) -> Result<Model, (String, String)> {
     let c = document.c.clone().shaped(outputs, n);
     let d = d.map_or_else(
         || DMatrix::zeros(c.nrows(), b.ncols()),
-        |d| super::matrix::Rows(d).shaped(outputs, inputs),
+        |d| Rows(d).shaped(outputs, inputs),
     );
     let k = document
         .k

@@ -14,7 +14,7 @@
 //!
 //! An [`Experiment`] carries out a Monte Carlo study and delivers a [`Reproduction`]: comparison with the paper,
 //! pictures and tables as numbers. JSON, CSV, terminal and page are written from that one document, by
-//! [`report`](crate::report). Errors in print are found by computing what is printed, not by claiming it.
+//! `report`. Errors in print are found by computing what is printed, not by claiming it.
 //!
 //! | file | what it holds |
 //! |---|---|

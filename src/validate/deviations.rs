@@ -2,10 +2,9 @@
 //! judged on them.
 
 use super::{RecordView, Relation, ValidateError, Validation, ValidationOptions, validate};
-use crate::identify::{AlignedColumns, IdentifiedChannel, Model, Records};
+use crate::identify::{AlignedColumns, IdentifiedChannel, Model, Records, channel_names};
 use crate::log::{Log, LogError};
 use crate::moments::{Detrend, LagAccumulator, Trend};
-use crate::report::names;
 
 /// Values of a long recording that the residual tests look at, from its beginning: more do not sharpen their
 /// verdict, but cost time and memory.
@@ -118,8 +117,8 @@ pub fn judge(
         relation,
         &ValidationOptions {
             level: level.unwrap_or(default.level),
-            input_names: names(&model.inputs),
-            output_names: names(&model.outputs),
+            input_names: channel_names(&model.inputs),
+            output_names: channel_names(&model.outputs),
             ..default
         },
     )

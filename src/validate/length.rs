@@ -1,7 +1,8 @@
 //! How long a record must be before the tests can speak against a model.
 
+use super::SAMPLES_PER_LAG;
 use super::result::TooShort;
-use super::{MOST_LAGS, SAMPLES_PER_LAG};
+use crate::covariance::MOST_LAGS;
 
 /// `None` when a record of so many samples can tell a right model of `(states, inputs, outputs)` from a wrong one.
 ///

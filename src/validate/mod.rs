@@ -79,11 +79,10 @@ pub use result::{
     FitMeasure, InnovationSize, LinearityScope, OutputFit, OutputSize, PairCorrelation,
     ResidualTest, Strongest, TooShort, Validation,
 };
-pub(crate) use sensitivity::numbers as numbers_of_tests;
 
 use nalgebra::DMatrix;
 
-use crate::covariance::ParameterCovariance;
+use crate::covariance::{MOST_LAGS, ParameterCovariance};
 use crate::model::StateSpace;
 use linearity::Linearity;
 use partial::Partial;
@@ -91,8 +90,6 @@ use residuals::Residuals;
 use sensitivity::{Regressor, Sensitivity};
 use statistic::{Outcome, ScoreCovariance, outcome};
 
-/// Most lags tested by default.
-const MOST_LAGS: usize = 25;
 /// Samples of each channel for one lag, by default.
 const SAMPLES_PER_LAG: usize = 10;
 /// Samples wanted for each tested or conditioning regressor.

@@ -2,27 +2,18 @@
 
 use nalgebra::DMatrix;
 
-use super::MOST_LAGS;
 use super::curvature::Curvature;
 use super::error::ValidateError;
 use super::filters::{Filters, Segment};
 use super::options::{RecordView, Relation};
 use super::partial::Partial;
 use super::residuals::Start;
-use crate::covariance::ParameterCovariance;
+use crate::covariance::{ParameterCovariance, samples_followed};
 use crate::linalg::{multiply, multiply_nt, symmetric_eigen};
 use crate::model::StateSpace;
 
-/// Most samples that the sensitivities are averaged over.
-const MOST_SAMPLES: usize = 20_000;
-/// Fewest, whatever the effort.
-const FEWEST_SAMPLES: usize = 4_000;
-/// Multiplications that the averages may take.
-const EFFORT: usize = 40_000_000;
 /// Samples handled at a time.
 const BLOCK: usize = 512;
-/// Matrices of tested regressors times sensitivities that are there at once.
-const PRODUCTS: usize = 6;
 /// Batches that tell how accurate the averages are, at most and at least so long.
 const BATCHES: usize = 16;
 const SHORTEST_BATCH: usize = 64;
@@ -67,21 +58,6 @@ pub(super) struct Averages {
     pub(super) remainder: f64,
     /// Samples averaged over.
     pub(super) samples: usize,
-}
-
-/// Numbers that the averages take for a model of `inputs` and `outputs` whose covariance has so many directions: the
-/// sensitivities of all samples, and [`PRODUCTS`] products of them with the tested regressors.
-pub(crate) fn numbers(inputs: usize, outputs: usize, directions: usize) -> usize {
-    let channels = inputs.saturating_add(outputs);
-    let width = channels.saturating_mul(MOST_LAGS + 1);
-    let each = directions.saturating_mul(outputs);
-    let samples = samples_followed(each, width);
-    each.saturating_mul(samples.saturating_add(width.saturating_mul(PRODUCTS)))
-}
-
-/// Samples that sensitivities are averaged over, where each has `each` numbers and is multiplied with `width`.
-fn samples_followed(each: usize, width: usize) -> usize {
-    (EFFORT / each.saturating_mul(width).max(1)).clamp(FEWEST_SAMPLES, MOST_SAMPLES)
 }
 
 impl Sensitivity {

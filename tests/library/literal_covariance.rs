@@ -1,7 +1,7 @@
 //! The lean covariance against van Wingerden's own form, written out with matrices as long as the record,
 //! and the sign of the beta terms (B.2), (B.4), which is wrong in print.
 
-use innovant::covariance::{subspace_covariance, subspace_jacobian};
+use innovant::identify::variance::{subspace_covariance, subspace_jacobian};
 use innovant::identify::{
     Estimate, Varx, Weight, decompose, predictor_coefficients, system_matrices, varx,
 };

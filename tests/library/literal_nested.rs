@@ -1,9 +1,8 @@
 //! Chiuso & Picci (3.1)-(3.5) written out, with the conditional covariances and Kronecker products of the paper, against
 //! the compact form; and what the errors in print do.
 
-use innovant::covariance::{
-    AsymptoticMethod, ParameterCovariance, asymptotic_covariance, frequency_response_covariance,
-};
+use innovant::covariance::{ParameterCovariance, frequency_response_covariance};
+use innovant::identify::variance::{AsymptoticMethod, asymptotic_covariance};
 use innovant::identify::{Prediction, Weight};
 use innovant::linalg::discrete_lyapunov;
 use innovant::systems::{ClosedLoop, chiuso_picci_one, van_wingerden_one};

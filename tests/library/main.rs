@@ -1,5 +1,5 @@
-//! The library: the papers' formulas in their literal form, reference arithmetic, invariances, and what every method has
-//! to do.
+//! The library: the papers' formulas in their literal form, reference arithmetic, invariances, the shape of the code, and what
+//! every method has to do.
 
 mod answers;
 mod chiuso_picci_variance;
@@ -15,5 +15,6 @@ mod methods;
 mod model_document;
 mod orders;
 mod properties;
+mod shape;
 #[path = "../support/variance.rs"]
 mod variance;

@@ -1,8 +1,7 @@
 //! Estimated against Monte Carlo and true asymptotic variance of a frequency response, as in section 5 of Chiuso & Picci.
 
-use innovant::covariance::{
-    AsymptoticMethod, asymptotic_covariance, frequency_response_covariance,
-};
+use innovant::covariance::frequency_response_covariance;
+use innovant::identify::variance::{AsymptoticMethod, asymptotic_covariance};
 use innovant::identify::{Method, Order, Polish, Prediction, Weight};
 use innovant::moments::Detrend;
 use innovant::systems::ClosedLoop;

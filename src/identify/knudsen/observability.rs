@@ -211,7 +211,7 @@ pub(super) fn stacked(
 
 /// A least-squares problem with its factor kept, for several right-hand sides and for derivatives.
 #[derive(Debug, Clone)]
-pub struct LeastSquares {
+pub(super) struct LeastSquares {
     q: DMatrix<f64>,
     r: DMatrix<f64>,
 }
@@ -221,7 +221,10 @@ impl LeastSquares {
     ///
     /// # Errors
     /// [`IdentifyError::SingularRegression`] when columns are dependent to working precision.
-    pub fn new(regressors: &DMatrix<f64>, what: &'static str) -> Result<Self, IdentifyError> {
+    pub(super) fn new(
+        regressors: &DMatrix<f64>,
+        what: &'static str,
+    ) -> Result<Self, IdentifyError> {
         let (q, r) = qr_thin(regressors);
         if r.nrows() < r.ncols() || reciprocal_condition_upper(&r) < DEPENDENT {
             return Err(IdentifyError::SingularRegression { what });
@@ -230,12 +233,12 @@ impl LeastSquares {
     }
 
     /// `F^+ b`.
-    pub fn solve(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(super) fn solve(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
         solve_upper(&self.r, &multiply_tn(&self.q, right))
     }
 
     /// `(F' F)^-1 b`.
-    pub fn solve_normal(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(super) fn solve_normal(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
         solve_upper(&self.r, &solve_upper_transposed(&self.r, right))
     }
 }

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use super::{Decomposed, Estimated, Orders, Propagation, Uncertain, Windows};
-use crate::covariance::{NestedErrors, newest_first};
+use super::{Decomposed, Estimated, Orders, Uncertain, Windows};
 use crate::identify::error::IdentifyError;
 use crate::identify::nested::{
     Nested, NestedDecomposition, Prediction, decompose_nested, nested_system_matrices,
 };
 use crate::identify::pbsid_opt::Estimate;
 use crate::identify::source::Source;
+use crate::identify::variance::{NestedErrors, Propagation, newest_first};
 use crate::linalg::qr_r;
 use crate::model::StateSpace;
 use crate::moments::RFactor;

@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::{Decomposed, Estimated, Orders, Uncertain, Windows};
 use crate::covariance::ParameterCovariance;
+use crate::identify::algorithms::Stochastic;
 use crate::identify::error::IdentifyError;
 use crate::identify::knudsen::{
     Decomposition, Influence, Knudsen, Observability, Regression, ResidualStep,
@@ -12,7 +13,6 @@ use crate::identify::knudsen::{
 use crate::identify::pem::{Form, PredictionErrorEstimate, Signals, prediction_error_method};
 use crate::identify::polish::{Effort, polish};
 use crate::identify::source::Source;
-use crate::identify::stochastic::Stochastic;
 use crate::identify::varx::varx;
 use crate::linalg::{multiply, pseudo_inverse};
 use crate::model::StateSpace;
@@ -27,11 +27,6 @@ const COVARIANCE_SAMPLES: usize = 50_000;
 const POLISH_STEPS: usize = 2;
 /// Relative size below which states are not observable to working precision.
 const DEPENDENT: f64 = 1e-12;
-
-/// The smallest past window that is chosen automatically. The paper finds that a larger one than `n + 2` performs
-/// poorly; with the future window kept at `n / l + 2` the opposite was measured: the rms of the noise parameters falls
-/// by a third and more in two of its three systems.
-pub(super) const SMALLEST_PAST: usize = 20;
 
 /// Signals of all experiments, scaled and detrended.
 type Experiments = Vec<Vec<Vec<f64>>>;

@@ -22,186 +22,20 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 
+pub use super::algorithms::Method;
+use super::algorithms::Stochastic;
 use super::error::IdentifyError;
-use super::horizon;
 use super::nested::Prediction;
 use super::pbsid_opt::Weight;
 use super::source::Source;
-use super::stochastic::Stochastic;
+use super::variance::Propagation;
 use super::varx::Varx;
-use crate::covariance::{ParameterCovariance, ParameterLayout};
+use crate::covariance::ParameterCovariance;
 use crate::model::StateSpace;
 use crate::moments::RFactor;
 
-/// Algorithm that estimates the system matrices.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Default,
-    Serialize,
-    Deserialize,
-    schemars::JsonSchema,
-    clap::ValueEnum,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum Method {
-    /// Predictor-based subspace identification, optimised (van Wingerden); the first step of the
-    /// maximum-likelihood polish
-    #[default]
-    PbsidOpt,
-    /// Knudsen's tk-chol (with --stochastic first-column tk); open loop only
-    Knudsen,
-    /// Prediction error method: maximum likelihood in the time domain, started from tk-chol or PBSID_opt
-    Pem,
-    /// Robust combined subspace algorithm of van Overschee and De Moor; open loop only
-    Subid,
-    /// Predictor-based with nested regressions, also called the whitening filter (Chiuso & Picci)
-    Whitening,
-    /// Innovation estimation (Qin & Ljung): least disturbed by a past window that is short for the noise dynamics
-    InnovationEstimation,
-}
-
 impl Method {
-    /// Every method there is.
-    pub fn all() -> &'static [Self] {
-        clap::ValueEnum::value_variants()
-    }
-
-    /// The name on the command line and in documents.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::PbsidOpt => "pbsid-opt",
-            Self::Knudsen => "knudsen",
-            Self::Pem => "pem",
-            Self::Subid => "subid",
-            Self::Whitening => "whitening",
-            Self::InnovationEstimation => "innovation-estimation",
-        }
-    }
-
-    /// Lags that the moments must hold for these windows; `future` is `None` when it is chosen later, and is at
-    /// most `past` then.
-    pub fn lags(self, past: usize, future: Option<usize>) -> usize {
-        match self {
-            Self::PbsidOpt => past,
-            Self::Whitening | Self::InnovationEstimation => {
-                past.saturating_add(future.unwrap_or(past))
-            }
-            // An order that fits the past window of l outputs has a future of at most past + 2.
-            Self::Knudsen | Self::Pem | Self::Subid => {
-                past.saturating_add(future.unwrap_or(past.saturating_add(2)))
-            }
-        }
-    }
-
-    /// Whether the future window may be longer than the past window.
-    pub fn allows_longer_future(self) -> bool {
-        match self {
-            Self::PbsidOpt | Self::Pem | Self::Subid => false,
-            Self::Whitening | Self::InnovationEstimation | Self::Knudsen => true,
-        }
-    }
-
-    /// Future window for an order when none is asked for.
-    pub fn future(self, past: usize, outputs: usize, order: usize) -> usize {
-        match self {
-            Self::PbsidOpt | Self::Whitening | Self::InnovationEstimation | Self::Pem => {
-                horizon::future_for_order(past, outputs, order)
-            }
-            // Longer ones add noise to the Toeplitz matrices faster than they add information.
-            Self::Knudsen => order.div_ceil(outputs) + 2,
-            // The algorithm needs both windows equal.
-            Self::Subid => past,
-        }
-    }
-
-    /// Smallest past window that is chosen automatically, for the largest order that is asked for.
-    pub fn smallest_past(self, outputs: usize, order: usize) -> usize {
-        match self {
-            Self::PbsidOpt | Self::Whitening | Self::InnovationEstimation | Self::Pem => 1,
-            Self::Knudsen => knudsen::SMALLEST_PAST,
-            // n states are seen over n / l samples, and the future window is shifted by one.
-            Self::Subid => order.div_ceil(outputs).saturating_add(2),
-        }
-    }
-
-    /// The method that stands in while orders are compared: the prediction error method runs once, in the end.
-    pub fn for_comparing_orders(self) -> Self {
-        match self {
-            Self::Pem => Self::PbsidOpt,
-            other => other,
-        }
-    }
-
-    /// Whether the method does `--polish always` itself: its numbers are then those of its own improvement.
-    pub fn polishes_itself(self) -> bool {
-        match self {
-            // One Gauss-Newton step in the time domain; the other is maximum likelihood as it is.
-            Self::Knudsen | Self::Pem => true,
-            Self::PbsidOpt | Self::Whitening | Self::InnovationEstimation | Self::Subid => false,
-        }
-    }
-
-    /// Whether feedback biases the estimate.
-    pub fn open_loop_only(self) -> bool {
-        match self {
-            Self::Knudsen | Self::Subid => true,
-            Self::PbsidOpt | Self::Pem | Self::Whitening | Self::InnovationEstimation => false,
-        }
-    }
-
-    /// Whether the method does this stochastic step itself, with its covariance.
-    pub fn has_own(self, step: Stochastic) -> bool {
-        self == Self::Knudsen && matches!(step, Stochastic::FirstColumn | Stochastic::Cholesky)
-    }
-
-    /// Whether [`Uncertain::covariance`] has a formula.
-    pub fn has_covariance(self) -> bool {
-        match self {
-            Self::PbsidOpt
-            | Self::Whitening
-            | Self::InnovationEstimation
-            | Self::Knudsen
-            | Self::Pem => true,
-            Self::Subid => false,
-        }
-    }
-
-    /// Whether [`Uncertain::propagation`] has a formula, which a stochastic step of another method builds on.
-    pub fn has_propagation(self) -> bool {
-        match self {
-            Self::PbsidOpt | Self::Whitening | Self::InnovationEstimation => true,
-            Self::Knudsen | Self::Pem | Self::Subid => false,
-        }
-    }
-
-    /// Whether `--polish auto` polishes. Who asks for another method by name wants that method's numbers: the
-    /// polished model is the same whatever method it started from.
-    pub fn polishes_by_default(self) -> bool {
-        self == Self::PbsidOpt
-    }
-
-    /// The weight of the singular value decomposition when none is asked for; `automatic` is what the sizes of
-    /// the innovations speak for.
-    ///
-    /// Innovation estimation takes canonical variates: its stacked noise has the covariance `G (I (x) Lambda) G'`
-    /// with `G` the impulse response of the noise model, far from the identity even for one output, so the identity
-    /// weight costs variance (3 times the Cramer-Rao bound in example 1 of Chiuso & Picci, 22 times in example 2 at
-    /// 3 rad; with canonical variates 1.0 and 1.5 times).
-    pub fn default_weight(self, automatic: Weight) -> Weight {
-        match self {
-            Self::PbsidOpt | Self::Whitening => automatic,
-            Self::InnovationEstimation => Weight::Cva,
-            // Their one weight is part of them; subid's own is called SV.
-            Self::Knudsen | Self::Pem | Self::Subid => Weight::Identity,
-        }
-    }
-
     /// The step that all orders share.
     ///
     /// # Errors
@@ -334,15 +168,4 @@ pub trait Uncertain: Debug + Send + Sync {
     /// # Errors
     /// [`IdentifyError`] when those data do not allow it.
     fn replicate(&self, factor: &RFactor) -> Result<StateSpace, IdentifyError>;
-}
-
-/// First-order errors as a linear function of white noise `w` of unit covariance.
-#[derive(Debug, Clone)]
-pub struct Propagation {
-    /// How the parameters are laid out.
-    pub layout: ParameterLayout,
-    /// Errors of the parameters, `theta x w`: `Cov = P P'`.
-    pub parameters: DMatrix<f64>,
-    /// Errors of the vector ARX coefficients, `vec` of an `l x m` matrix, in the same noise.
-    pub coefficients: DMatrix<f64>,
 }

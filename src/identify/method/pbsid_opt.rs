@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use super::{Decomposed, Estimated, Orders, Propagation, Uncertain, Windows};
-use crate::covariance::{ParameterCovariance, subspace_covariance, subspace_propagation};
+use super::{Decomposed, Estimated, Orders, Uncertain, Windows};
+use crate::covariance::ParameterCovariance;
 use crate::identify::error::IdentifyError;
 use crate::identify::pbsid_opt::{Decomposition, Estimate, decompose, system_matrices};
 use crate::identify::source::Source;
+use crate::identify::variance::{Propagation, subspace_covariance, subspace_propagation};
 use crate::identify::varx::varx;
 use crate::model::StateSpace;
 use crate::moments::RFactor;

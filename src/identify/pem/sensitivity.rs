@@ -25,7 +25,7 @@ fn split(signals: &Signals, inputs: usize) -> (Vec<&[f64]>, Vec<&[f64]>) {
 ///
 /// # Errors
 /// [`ModelError`] when the signals do not fit the system.
-pub fn prediction_errors(
+pub(super) fn prediction_errors(
     system: &StateSpace,
     signals: &Signals,
     innovation_covariance: &DMatrix<f64>,
@@ -48,7 +48,7 @@ pub fn prediction_errors(
 ///
 /// # Errors
 /// [`LinalgError`] for numbers that are not finite.
-pub fn linearised_errors(
+pub(super) fn linearised_errors(
     system: &StateSpace,
     layout: &ParameterLayout,
     directions: &DMatrix<f64>,

@@ -20,7 +20,7 @@ const SMALLEST: f64 = 1e-12;
 /// Of all such bases it is the one that a symmetric transformation leads to. That is a smooth function of the system,
 /// so that models that are near each other stay comparable entry by entry (the jackknife compares them so), which the
 /// singular vectors of a nearly double singular value are not.
-pub fn balanced(system: &StateSpace, past: usize) -> StateSpace {
+pub(super) fn balanced(system: &StateSpace, past: usize) -> StateSpace {
     let seen = stacked(&observability(system, past));
     let rows: Vec<DMatrix<f64>> = controllability(system, past)
         .iter()
@@ -42,7 +42,7 @@ fn symmetric(transformation: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 /// The `order` states of `system` that predictions of the recording rest on most: balanced truncation of its one-step
 /// predictor, weighted by the innovation covariance and by what the past window held. A start for the polish where that
 /// of the subspace method is poor.
-pub fn reduced(system: &StateSpace, varx: &Varx, order: usize) -> Option<StateSpace> {
+pub(crate) fn reduced(system: &StateSpace, varx: &Varx, order: usize) -> Option<StateSpace> {
     let past = varx.past;
     let upper = cholesky_upper(&varx.innovation_covariance).ok()?;
     let whitened: Vec<DMatrix<f64>> = observability(system, past)

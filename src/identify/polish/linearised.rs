@@ -13,7 +13,7 @@ const DETERMINED: f64 = 1e-13;
 /// The linearised problem in the singular directions of its Jacobian: minimum-norm Gauss-Newton and damped
 /// steps, and the pseudo-inverse of the information, all of the rank that the input-output behaviour
 /// determines.
-pub struct Linearised {
+pub(super) struct Linearised {
     /// Right singular vectors, one column a direction.
     directions: DMatrix<f64>,
     /// Singular values.
@@ -46,7 +46,7 @@ impl Linearised {
     }
 
     /// Decrease of the cost that a full step promises.
-    pub fn decrease(&self) -> f64 {
+    pub(super) fn decrease(&self) -> f64 {
         let determined = DETERMINED * self.largest();
         self.values
             .iter()
@@ -58,7 +58,7 @@ impl Linearised {
 
     /// Step with Levenberg-Marquardt damping `damping` (relative to the largest singular value; zero is
     /// Gauss-Newton).
-    pub fn step(&self, damping: f64) -> DVector<f64> {
+    pub(super) fn step(&self, damping: f64) -> DVector<f64> {
         let largest = self.largest();
         let coefficients = DVector::from_iterator(
             self.values.len(),
@@ -74,7 +74,7 @@ impl Linearised {
     }
 
     /// Pseudo-inverse of the information.
-    pub fn covariance(&self) -> DMatrix<f64> {
+    pub(super) fn covariance(&self) -> DMatrix<f64> {
         let mut scaled = self.directions.clone();
         for (i, &value) in self.values.iter().enumerate() {
             let inverse = if value > DETERMINED * self.largest() {
@@ -91,7 +91,7 @@ impl Linearised {
 /// Derivative of the modulus of each eigenvalue of `A` that sits on the circle of `radius`, with respect to
 /// the parameters: `d|lambda| = Re(conj(lambda) / |lambda| w dA v)`. One row an eigenvalue, of a complex pair
 /// only one.
-pub fn boundary_gradient(
+pub(super) fn boundary_gradient(
     system: &StateSpace,
     layout: &ParameterLayout,
     radius: f64,
@@ -121,7 +121,7 @@ pub fn boundary_gradient(
 
 /// The linearised problem, confined to the boundary of the stability radius where a free step would leave
 /// it (an active set: an eigenvalue that the step would take inward is let go).
-pub fn linearise(
+pub(super) fn linearise(
     jacobian: DMatrix<f64>,
     residual: &[f64],
     rank: usize,

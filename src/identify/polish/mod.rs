@@ -15,6 +15,7 @@
 mod balanced;
 mod linearised;
 mod predictor;
+mod stabilised;
 
 use nalgebra::DMatrix;
 
@@ -23,6 +24,7 @@ pub(super) use self::balanced::reduced;
 use self::linearised::{boundary_gradient, linearise};
 pub(super) use self::predictor::Problem;
 pub use self::predictor::predictor_coefficients;
+pub(super) use self::stabilised::stabilised;
 use super::stable::{with_poles_inside, with_stable_predictor};
 use super::varx::Varx;
 use crate::covariance::{ParameterCovariance, ParameterLayout};

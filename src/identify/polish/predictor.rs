@@ -8,7 +8,7 @@ use crate::linalg::{LinalgError, cholesky_upper, multiply, multiply_nt, solve_up
 use crate::model::StateSpace;
 
 /// Data of the weighted least-squares problem.
-pub struct Problem<'a> {
+pub(crate) struct Problem<'a> {
     varx: &'a Varx,
     layout: ParameterLayout,
     /// Inverse of the lower Cholesky factor of Lambda.
@@ -18,7 +18,7 @@ pub struct Problem<'a> {
 }
 
 /// `C At^i`, `i = 0 .. p-1`.
-pub fn observability(system: &StateSpace, past: usize) -> Vec<DMatrix<f64>> {
+pub(super) fn observability(system: &StateSpace, past: usize) -> Vec<DMatrix<f64>> {
     let predictor = system.predictor_matrix();
     let next = |row: &DMatrix<f64>| Some(row * &predictor);
     std::iter::successors(Some(system.c.clone()), next)
@@ -27,7 +27,7 @@ pub fn observability(system: &StateSpace, past: usize) -> Vec<DMatrix<f64>> {
 }
 
 /// `At^i [B~ K]`, `i = 0 .. p-1`.
-pub fn controllability(system: &StateSpace, past: usize) -> Vec<DMatrix<f64>> {
+pub(super) fn controllability(system: &StateSpace, past: usize) -> Vec<DMatrix<f64>> {
     let predictor = system.predictor_matrix();
     let mut input = DMatrix::zeros(system.states(), system.inputs() + system.outputs());
     input
@@ -80,7 +80,7 @@ impl<'a> Problem<'a> {
     ///
     /// # Errors
     /// [`LinalgError::NotPositiveDefinite`] for a singular innovation covariance.
-    pub fn new(varx: &'a Varx, layout: ParameterLayout) -> Result<Self, LinalgError> {
+    pub(crate) fn new(varx: &'a Varx, layout: ParameterLayout) -> Result<Self, LinalgError> {
         let upper = cholesky_upper(&varx.innovation_covariance)?;
         let identity = DMatrix::identity(layout.outputs, layout.outputs);
         let whitener = solve_upper_transposed(&upper, &identity);
@@ -93,14 +93,14 @@ impl<'a> Problem<'a> {
     }
 
     /// Whitened difference between the estimated predictions and those of a system, one column an output (`m x l`).
-    pub fn residual(&self, system: &StateSpace) -> DMatrix<f64> {
+    pub(crate) fn residual(&self, system: &StateSpace) -> DMatrix<f64> {
         let coefficients = predictor_coefficients(system, self.varx.past, self.layout.feedthrough);
         let whitened = multiply(&self.whitener, &coefficients);
         &self.target - multiply_nt(&self.varx.regressor_factor, &whitened)
     }
 
     /// Sum of squares of the residual, in units of chi-square; infinite when it overflows.
-    pub fn cost(&self, system: &StateSpace) -> f64 {
+    pub(crate) fn cost(&self, system: &StateSpace) -> f64 {
         let residual = self.residual(system);
         let cost = residual.norm_squared();
         if cost.is_finite() {
@@ -115,7 +115,7 @@ impl<'a> Problem<'a> {
     ///
     /// All of it are combinations of three products with `Rz`, of which the first is nearly all the work: the
     /// derivatives with respect to the predictor matrix `At`, to what enters the state, and to what leaves it.
-    pub fn jacobian(&self, system: &StateSpace) -> DMatrix<f64> {
+    pub(crate) fn jacobian(&self, system: &StateSpace) -> DMatrix<f64> {
         let ParameterLayout {
             states: n,
             inputs,

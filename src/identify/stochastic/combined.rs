@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use super::{Stochastic, StochasticPart};
 use crate::identify::error::IdentifyError;
-use crate::identify::method::{Decomposed, Estimated, Orders, Propagation, Uncertain, Windows};
+use crate::identify::method::{Decomposed, Estimated, Orders, Uncertain, Windows};
 use crate::identify::source::Source;
+use crate::identify::variance::Propagation;
 use crate::model::StateSpace;
 use crate::moments::RFactor;
 

@@ -14,28 +14,14 @@ mod innovations;
 mod residual;
 
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 
+pub use super::algorithms::Stochastic;
 use super::error::IdentifyError;
 use super::knudsen::ResidualStep;
-use super::method::{Decomposed, Propagation, Windows};
+use super::method::{Decomposed, Windows};
+use super::variance::Propagation;
 use crate::model::StateSpace;
 use crate::moments::RFactor;
-
-/// Step that estimates `K` and `Lambda` in the place of the method's own.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema, clap::ValueEnum,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum Stochastic {
-    /// The gain whose one-step predictor is nearest to the vector ARX model, given A, B, C, D: maximum
-    /// likelihood for K alone, also in closed loop
-    Innovations,
-    /// Knudsen's tk: the first block column of the covariance of stacked residuals; open loop only
-    FirstColumn,
-    /// Knudsen's tk-chol: its Cholesky factor, which takes most of the bias of tk away; open loop only
-    Cholesky,
-}
 
 /// What a stochastic step delivers, in the scaled units and the state basis of the deterministic part.
 #[derive(Debug, Clone)]
@@ -47,45 +33,6 @@ pub struct StochasticPart {
 }
 
 impl Stochastic {
-    /// Every step there is.
-    pub fn all() -> &'static [Self] {
-        clap::ValueEnum::value_variants()
-    }
-
-    /// The name on the command line and in documents.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Innovations => "innovations",
-            Self::FirstColumn => "first-column",
-            Self::Cholesky => "cholesky",
-        }
-    }
-
-    /// Whether feedback biases the estimate.
-    pub fn open_loop_only(self) -> bool {
-        match self {
-            Self::Innovations => false,
-            Self::FirstColumn | Self::Cholesky => true,
-        }
-    }
-
-    /// Whether [`Stochastic::propagation`] has a formula.
-    pub fn has_covariance(self) -> bool {
-        match self {
-            Self::Innovations => true,
-            Self::FirstColumn | Self::Cholesky => false,
-        }
-    }
-
-    /// Lags that the moments must hold for these windows; `future` is `None` when it is chosen later, and is at
-    /// most `past` then.
-    pub fn lags(self, past: usize, future: Option<usize>) -> usize {
-        match self {
-            Self::Innovations => past,
-            Self::FirstColumn | Self::Cholesky => past.saturating_add(future.unwrap_or(past)),
-        }
-    }
-
     /// Past window of the data factor that [`Stochastic::estimate`] takes.
     pub fn window(self, windows: &Windows) -> usize {
         match self {

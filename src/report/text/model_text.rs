@@ -10,8 +10,7 @@ use super::validation_text::{findings, linearity_tested};
 use super::verdict::verdict;
 use super::{Style, comparison, wrapped};
 use crate::covariance::{Invariants, invariants};
-use crate::identify::{CovarianceKind, Model, Summary};
-use crate::report::names;
+use crate::identify::{CovarianceKind, Model, Summary, channel_names};
 use crate::validate::{FitMeasure, Validation};
 
 /// Poles and gains that a summary lists.
@@ -73,8 +72,8 @@ pub(super) fn described(model: &Model) -> Option<Invariants> {
     invariants(
         &model.system,
         model.covariance.as_ref(),
-        &names(&model.outputs),
-        &names(&model.inputs),
+        &channel_names(&model.outputs),
+        &channel_names(&model.inputs),
         &[],
         0,
     )

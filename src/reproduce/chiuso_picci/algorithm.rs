@@ -2,10 +2,8 @@
 
 use num_complex::Complex64;
 
-use crate::covariance::{
-    AsymptoticMethod, CovarianceError, ParameterCovariance, asymptotic_covariance,
-    frequency_response_covariance,
-};
+use crate::covariance::{CovarianceError, ParameterCovariance, frequency_response_covariance};
+use crate::identify::variance::{AsymptoticMethod, asymptotic_covariance};
 use crate::identify::{Method, Options, Order, Polish, Prediction, Weight, identify};
 use crate::log::Log;
 use crate::model::StateSpace;

@@ -5,7 +5,8 @@ use num_complex::Complex64;
 
 use super::estimate::{Failure, Response, Setting, Subspace, truth};
 use super::measure::{Bounds, bounds};
-use crate::covariance::{Path, response_bands, subspace_covariance};
+use crate::covariance::{Path, response_bands};
+use crate::identify::variance::subspace_covariance;
 use crate::reproduce::error::ReproduceError;
 use crate::reproduce::figure::{Curve, Figure, Panel, Quantity, Role, Row, Table};
 use crate::reproduce::study::{Study, successes};

@@ -3,9 +3,8 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use crate::covariance::{
-    Covariance2, ParameterCovariance, frequency_response_covariance, subspace_covariance,
-};
+use crate::covariance::{Covariance2, ParameterCovariance, frequency_response_covariance};
+use crate::identify::variance::subspace_covariance;
 use crate::identify::{
     Decomposition, Effort, Estimate, Varx, Weight, decompose, polish, system_matrices, varx,
 };

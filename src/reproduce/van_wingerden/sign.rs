@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::estimate::{Failure, Setting, Subspace};
-use crate::covariance::jacobian_with_sign;
 use crate::identify::predictor_coefficients;
+use crate::identify::variance::jacobian_with_sign;
 use crate::model::StateSpace;
 use crate::systems::TestSystem;
 

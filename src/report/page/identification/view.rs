@@ -8,8 +8,7 @@ use super::plot::Group;
 use super::source::Source;
 use super::{PageError, order, poles, recording, residuals, response};
 use crate::covariance::invariants;
-use crate::identify::{IdentifiedChannel, Model};
-use crate::report::names;
+use crate::identify::{IdentifiedChannel, Model, channel_names};
 use crate::report::overview::Overview;
 use crate::report::text::{
     Style, doubtful, findings, fit_table, gain_table, linearity_tested, method, order_table,
@@ -58,8 +57,8 @@ pub(super) fn view(
     let described = invariants(
         &model.system,
         model.covariance.as_ref(),
-        &names(&model.outputs),
-        &names(&model.inputs),
+        &channel_names(&model.outputs),
+        &channel_names(&model.inputs),
         &model.system.default_frequencies(FREQUENCIES)?,
         model.summary.as_ref().map_or(0, |s| s.options.seed),
     )?;

@@ -7,11 +7,12 @@
 
 use nalgebra::DMatrix;
 
-use super::error::CovarianceError;
-use super::nested::NestedErrors;
-use super::parameters::ParameterCovariance;
+use super::nested_errors::NestedErrors;
 use super::subspace::subspace_covariance;
-use crate::identify::{Estimate, Prediction, Varx, Weight};
+use crate::covariance::{CovarianceError, ParameterCovariance};
+use crate::identify::nested::Prediction;
+use crate::identify::pbsid_opt::{Estimate, Weight};
+use crate::identify::varx::Varx;
 use crate::linalg::{
     LinalgError, cholesky_upper, discrete_lyapunov, multiply, multiply_nt, multiply_tn,
     pseudo_inverse, solve_upper, solve_upper_transposed,

@@ -27,8 +27,9 @@
 
 use nalgebra::DMatrix;
 
-use super::parameters::ParameterLayout;
-use crate::identify::{Prediction, Propagation};
+use super::propagation::Propagation;
+use crate::covariance::ParameterLayout;
+use crate::identify::nested::Prediction;
 use crate::linalg::{LinalgError, multiply, solve_upper_transposed, symmetric_square_root_factor};
 use crate::model::StateSpace;
 

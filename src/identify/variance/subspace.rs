@@ -15,8 +15,10 @@
 
 use nalgebra::DMatrix;
 
-use super::parameters::{ParameterCovariance, ParameterLayout};
-use crate::identify::{Estimate, Propagation, Varx};
+use super::propagation::Propagation;
+use crate::covariance::{ParameterCovariance, ParameterLayout};
+use crate::identify::pbsid_opt::Estimate;
+use crate::identify::varx::Varx;
 use crate::linalg::{
     LinalgError, multiply, multiply_nt, pseudo_inverse, solve_upper_right,
     symmetric_square_root_factor,

@@ -1,0 +1,319 @@
+//! The shape of the code: modules use each other one way (`src/lib.rs` has the map), told from the paths in the sources.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A module, and for each module that it uses the files that do.
+type Graph = BTreeMap<String, BTreeMap<String, BTreeSet<PathBuf>>>;
+
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            files.extend(sources(&path));
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            files.push(path);
+        }
+    }
+    files
+}
+
+/// `src/a/b.rs` and `src/a/b/mod.rs` are `[a, b]`, the root of the crate is `[]`.
+fn module_of(file: &Path, src: &Path) -> Vec<String> {
+    let relative = file.strip_prefix(src).unwrap().with_extension("");
+    let mut parts: Vec<String> = relative
+        .iter()
+        .map(|part| part.to_str().unwrap().to_owned())
+        .collect();
+    if ["mod", "lib", "main"].contains(&parts[parts.len() - 1].as_str()) {
+        parts.pop();
+    }
+    parts
+}
+
+/// A source without what only tests see, and the modules among it: an item ends with `;` in its first line, or with a
+/// `}` at the margin, as `cargo fmt` lays it out. Items inside others are left.
+fn without_tests(text: &str) -> (String, BTreeSet<String>) {
+    let (mut kept, mut modules) = (String::new(), BTreeSet::new());
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        if line != "#[cfg(test)]" {
+            kept.push_str(line);
+            kept.push('\n');
+            continue;
+        }
+        let item = lines.by_ref().find(|line| !line.starts_with("#["));
+        let item = item.unwrap_or_default();
+        if item.ends_with(';') {
+            let name = item.trim_end_matches(';').rsplit_once("mod ");
+            modules.extend(name.map(|(_, name)| name.to_owned()));
+        } else {
+            lines.by_ref().find(|line| *line == "}");
+        }
+    }
+    (kept, modules)
+}
+
+/// A path, and what it is called from then on.
+struct Named {
+    path: Vec<String>,
+    alias: Option<String>,
+}
+
+/// Adds the paths of a use tree, `a::{b, c::d as e}`, each behind `prefix`; gives what follows the tree.
+fn read_tree<'a>(text: &'a str, prefix: &[String], found: &mut Vec<Named>) -> &'a str {
+    let name = |text: &'a str| -> (String, &'a str) {
+        let end = text.find(|c: char| !(c.is_alphanumeric() || c == '_'));
+        let (name, rest) = text.split_at(end.unwrap_or(text.len()));
+        (name.to_owned(), rest)
+    };
+    if let Some(mut rest) = text.strip_prefix('{') {
+        loop {
+            rest = rest.trim_start_matches(|c: char| c.is_whitespace() || c == ',');
+            if rest.is_empty() || rest.starts_with('}') {
+                return rest.strip_prefix('}').unwrap_or(rest);
+            }
+            let before = rest.len();
+            rest = read_tree(rest, prefix, found);
+            if rest.len() == before {
+                return rest;
+            }
+        }
+    }
+    let (first, rest) = name(text);
+    if first.is_empty() {
+        return rest;
+    }
+    let mut path = prefix.to_vec();
+    path.push(first);
+    match rest.strip_prefix("::") {
+        Some(inner) if inner.starts_with(|c: char| c.is_alphabetic() || c == '_' || c == '{') => {
+            read_tree(inner, &path, found)
+        }
+        _ => {
+            let (alias, rest) = match rest.strip_prefix(" as ") {
+                Some(alias) => name(alias),
+                None => (String::new(), rest),
+            };
+            let alias = Some(alias).filter(|alias| !alias.is_empty());
+            found.push(Named { path, alias });
+            rest
+        }
+    }
+}
+
+/// Paths that a source names, from the root of the crate: behind `crate::`, and behind `super::` from where it stands.
+fn paths(text: &str, module: &[String]) -> Vec<Vec<String>> {
+    let mut found = Vec::new();
+    let mut rest = text;
+    while let Some(at) = ["crate::", "super::"]
+        .iter()
+        .filter_map(|start| rest.find(start))
+        .min()
+    {
+        let inside = rest[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_');
+        let upward = rest[at..].starts_with("super::");
+        rest = &rest[at + "crate::".len()..];
+        let mut levels = usize::from(upward);
+        while upward && let Some(after) = rest.strip_prefix("super::") {
+            levels += 1;
+            rest = after;
+        }
+        if inside || levels > module.len() {
+            continue;
+        }
+        let above = if upward { module.len() - levels } else { 0 };
+        rest = read_tree(rest, &module[..above], &mut found);
+    }
+    found.into_iter().map(|named| named.path).collect()
+}
+
+/// Names that a module takes from the modules in it, each with that module.
+fn exports(text: &str) -> BTreeMap<String, String> {
+    let mut found = Vec::new();
+    for (at, _) in text.match_indices("use ") {
+        let line = text[..at].rsplit('\n').next().unwrap_or_default();
+        if line.is_empty() || line.starts_with("pub") {
+            let tree = text[at + "use ".len()..].trim_start_matches("self::");
+            read_tree(tree, &[], &mut found);
+        }
+    }
+    found
+        .into_iter()
+        .filter(|named| named.path.len() > 1)
+        .map(|named| {
+            let last = named.path[named.path.len() - 1].clone();
+            (named.alias.unwrap_or(last), named.path[0].clone())
+        })
+        .collect()
+}
+
+/// What the modules in the module `root` use of each other, tests and their fixtures apart. Between the modules of `src/`
+/// links in the documentation count too; inside one of them a part may point to the function that it is a part of.
+fn graph(root: &[&str]) -> Graph {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let read: Vec<_> = sources(&src)
+        .into_iter()
+        .map(|file| {
+            let module = module_of(&file, &src);
+            let (mut text, tests) = without_tests(&fs::read_to_string(&file).unwrap());
+            if !root.is_empty() {
+                let code = |line: &&str| !line.trim_start().starts_with("//");
+                text = text.lines().filter(code).collect::<Vec<_>>().join("\n");
+            }
+            (file, module, text, tests)
+        })
+        .collect();
+    let mut of_tests = BTreeSet::new();
+    for (_, module, _, tests) in &read {
+        of_tests.extend(tests.iter().map(|name| {
+            let mut path = module.clone();
+            path.push(name.clone());
+            path
+        }));
+    }
+    // The module in `root` that a path leads into.
+    let inside = |path: &[String]| -> Option<String> {
+        path.starts_with(&root.iter().map(ToString::to_string).collect::<Vec<_>>())
+            .then(|| path.get(root.len()).cloned())?
+    };
+    let modules: BTreeSet<String> = read.iter().filter_map(|(_, m, ..)| inside(m)).collect();
+    let exported: BTreeMap<String, String> = read
+        .iter()
+        .filter(|(_, module, ..)| module == root)
+        .flat_map(|(_, _, text, _)| exports(text))
+        .collect();
+    let mut graph = Graph::new();
+    for (file, module, text, _) in &read {
+        let tested = (1..=module.len()).any(|length| of_tests.contains(&module[..length]));
+        let Some(user) = inside(module).filter(|_| !tested) else {
+            continue;
+        };
+        for path in paths(text, module) {
+            let Some(name) = inside(&path) else {
+                continue;
+            };
+            let used = if modules.contains(&name) {
+                &name
+            } else if let Some(used) = exported.get(&name) {
+                used
+            } else {
+                continue;
+            };
+            if *used != user && modules.contains(used) {
+                let uses = graph.entry(user.clone()).or_default();
+                let files = uses.entry(used.clone()).or_default();
+                files.insert(file.strip_prefix(&src).unwrap().to_owned());
+            }
+        }
+    }
+    graph
+}
+
+fn reached<'a>(graph: &'a Graph, from: &str, seen: &mut BTreeSet<&'a String>) {
+    for next in graph.get(from).into_iter().flat_map(BTreeMap::keys) {
+        if seen.insert(next) {
+            reached(graph, next, seen);
+        }
+    }
+}
+
+/// Uses that lie on a circle, with the files that make them.
+fn circular(graph: &Graph) -> Vec<String> {
+    let mut found = Vec::new();
+    for (module, uses) in graph {
+        for (used, files) in uses {
+            let mut seen = BTreeSet::new();
+            reached(graph, used, &mut seen);
+            if seen.contains(module) {
+                found.push(format!("{module} uses {used} in {files:?}"));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn modules_use_each_other_one_way() {
+    let graph = graph(&[]);
+    // What is read is what there is.
+    assert!(graph["identify"].contains_key("moments"), "{graph:?}");
+    assert!(graph["report"].contains_key("explain"), "{graph:?}");
+    let circular = circular(&graph);
+    assert!(circular.is_empty(), "{}", circular.join("\n"));
+}
+
+#[test]
+fn modules_of_identify_use_each_other_one_way() {
+    let graph = graph(&["identify"]);
+    assert!(graph["method"].contains_key("pbsid_opt"), "{graph:?}");
+    let circular = circular(&graph);
+    assert!(circular.is_empty(), "{}", circular.join("\n"));
+}
+
+#[test]
+fn uses_are_seen_however_they_are_written() {
+    let module = ["report".to_owned(), "text".to_owned()];
+    let found = |text: &str| -> Vec<String> {
+        let (text, _) = without_tests(text);
+        let paths = paths(&text, &module);
+        paths.iter().map(|path| path.join("/")).collect()
+    };
+    assert_eq!(
+        found("use crate::log::{Log, Roles};"),
+        ["log/Log", "log/Roles"]
+    );
+    assert_eq!(
+        found("use crate::{\n    log::{Log, Roles},\n    model as plant,\n};\nuse crate::linalg;"),
+        ["log/Log", "log/Roles", "model", "linalg"]
+    );
+    assert_eq!(found("use super::super::log::Log;"), ["log/Log"]);
+    assert_eq!(
+        found("use super::{json, number};"),
+        ["report/json", "report/number"]
+    );
+    assert_eq!(found("use super::*;"), [""; 0]);
+    assert_eq!(
+        found("let a: Vec<crate::model::Pole> = crate::log::of(super::b::<f64>());"),
+        ["model/Pole", "log/of", "report/b"]
+    );
+    assert_eq!(
+        found("/// [`Log`](crate::log::Log), my_crate::log"),
+        ["log/Log"]
+    );
+    let tests = "#[cfg(test)]\nmod tests {\n    use crate::log::Log;\n}\nuse crate::model::Pole;";
+    assert_eq!(found(tests), ["model/Pole"]);
+    let (_, modules) = without_tests("#[cfg(test)]\npub(crate) mod fixtures;\n");
+    assert_eq!(modules, BTreeSet::from(["fixtures".to_owned()]));
+    assert_eq!(
+        exports("mod a;\npub use a::{B, c::D as E};\nuse self::a::f;\n"),
+        ["B", "E", "f"]
+            .map(|name| (name.to_owned(), "a".to_owned()))
+            .into()
+    );
+}
+
+#[test]
+fn circles_are_found() {
+    let mut graph = Graph::new();
+    let mut add = |module: &str, used: &str| {
+        let file = PathBuf::from(format!("{module}.rs"));
+        let uses = graph.entry(module.to_owned()).or_default();
+        uses.entry(used.to_owned()).or_default().insert(file);
+    };
+    add("log", "limits");
+    add("identify", "log");
+    add("report", "identify");
+    add("identify", "validate");
+    add("validate", "report");
+    assert_eq!(
+        circular(&graph),
+        [
+            "identify uses validate in {\"identify.rs\"}",
+            "report uses identify in {\"report.rs\"}",
+            "validate uses report in {\"validate.rs\"}"
+        ]
+    );
+}
