@@ -67,6 +67,16 @@ pub trait Simulated: Send + Sync {
     /// The derivatives of the answers of several runs; none where there are none.
     fn slopes(&self, runs: &[Run], directions: &[Direction]) -> Option<Vec<Slopes>>;
 
+    /// The same along runs whose states are known, approximately and at less cost; none where there is no such way.
+    fn frozen_slopes(
+        &self,
+        _runs: &[Run],
+        _states: &[Vec<Vec<f64>>],
+        _directions: &[Direction],
+    ) -> Option<Vec<Slopes>> {
+        None
+    }
+
     /// The same, simulated only as accurately as a search needs.
     fn for_search(&self) -> Arc<dyn Simulated>;
 
@@ -123,6 +133,25 @@ impl Simulated for Plant {
             )
         };
         Some(runs.iter().map(of_run).collect())
+    }
+
+    fn frozen_slopes(
+        &self,
+        runs: &[Run],
+        states: &[Vec<Vec<f64>>],
+        directions: &[Direction],
+    ) -> Option<Vec<Slopes>> {
+        let of_run = |(r, states): (&Run, &Vec<Vec<f64>>)| {
+            self.frozen_sensitivities(
+                r.point,
+                &r.excitation,
+                r.observer.as_ref(),
+                r.plan,
+                states,
+                directions,
+            )
+        };
+        runs.iter().zip(states).map(of_run).collect()
     }
 
     fn for_search(&self) -> Arc<dyn Simulated> {

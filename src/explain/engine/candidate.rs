@@ -267,7 +267,7 @@ mod tests {
                     .collect(),
             };
             for (place, argument) in at.iter().flat_map(|p| own.iter().map(move |a| (*p, *a))) {
-                for shapes in grid(term, argument.map(|a| &arguments[a]), &recordings) {
+                for shapes in grid(term, argument.map(|a| &arguments[a]), &recordings, &[3.0]) {
                     let mut lead = Lead::untested(term, place).at(place, argument, &shapes);
                     lead.sensor = term.port == Port::Sensor;
                     lead.strength = 0.1;

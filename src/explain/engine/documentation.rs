@@ -258,6 +258,17 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
         )],
     ),
     effect(
+        "periodic_disturbance",
+        "force that repeats in time",
+        "m*der(v) = ... + c*sin(w*time + p)",
+        ANY_EQUATION,
+        TIME,
+        &[like(
+            "cogging",
+            "Record at another speed: cogging and unbalance follow it, a disturbance keeps its frequency.",
+        )],
+    ),
+    effect(
         "overflow",
         "flow above a level",
         "A*der(h) = ... + c*sqrt(max(h - h0, 0)), or c*max(h - h0, 0)",

@@ -155,7 +155,7 @@ pub(super) fn held_out(
             let mut point = fit.point[..parameters].to_vec();
             point.extend(kept_start);
             let again = match estimator {
-                Estimator::FreeRun => training.least_squares(&point)?,
+                Estimator::FreeRun => training.least_squares_with(&point, AGAIN)?,
                 Estimator::Likelihood => {
                     point.extend(gains);
                     let from = Fit {
@@ -172,7 +172,7 @@ pub(super) fn held_out(
                 ..options.clone()
             };
             let test = Study::new(&fitted, &left_out, &of_states).ok()?;
-            let run = test.least_squares(&left_out_start)?;
+            let run = test.least_squares_with(&left_out_start, AGAIN)?;
             test.residual(&run)
         })
         .collect();

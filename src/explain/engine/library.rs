@@ -57,6 +57,8 @@ pub(crate) enum Starts {
     Samples(&'static [f64]),
     /// As they stand.
     Values(&'static [f64]),
+    /// Frequencies at which the spectrum of the residual has its peaks.
+    Peaks,
     /// Parts of a whole.
     Share(&'static [f64]),
     /// What the integral of the argument moves in a sample at a typical size of it.
@@ -356,6 +358,20 @@ pub(crate) const TERMS: &[Term] = &[
         Time,
         "(if time > {t0} then 1.0 else 0.0)",
         &[shape("t0", Starts::Length(TIMES), false)],
+    ),
+    curve(
+        "periodic",
+        Equation,
+        Time,
+        "sin({w}*time + {p})",
+        &[
+            shape("w", Starts::Peaks, true),
+            shape(
+                "p",
+                Starts::Values(&[0.0, std::f64::consts::FRAC_PI_2]),
+                false,
+            ),
+        ],
     ),
     curve("parameter_curve", Parameter, Anything, "{z}", &[]),
     curve("parameter_square", Parameter, Anything, "{z}^2", &[]),

@@ -163,6 +163,7 @@ pub(crate) fn called(
         (Port::Equation, "root_above") if *variables == [own] => "overflow",
         (Port::Equation, "root") if *variables == [own] => "leak",
         (Port::Equation, "sine") => "cogging",
+        (Port::Equation, "periodic") => "periodic_disturbance",
         (Port::Equation, "radiation") => "radiation",
         (Port::Equation, "natural_convection") if what == Kind::Temperature => "natural_convection",
         (Port::Equation, "load_constant" | "load_ramp" | "load_step") => {

@@ -13,6 +13,7 @@ use super::names::rank_of;
 use super::path::{hooked, path};
 use super::projection::{Projection, SIGNATURE};
 use super::values::{Instance, evaluate, grid};
+use crate::explain::locate::spectrum;
 use crate::noise::Series;
 use crate::physics::estimate::{Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Node, Unknown, VariableId};
@@ -22,6 +23,11 @@ const BATCH: usize = 64;
 
 /// Terms whose columns differ by less than this angle are one: 1e-4 of the statistic of either tells them apart.
 const SAME: f64 = 0.01;
+
+/// Peaks of the spectrum of each output that are tried as periodic disturbances.
+const PEAKS: usize = 3;
+/// Fewer periods in a recording are a trend.
+const LEAST_PERIODS: f64 = 3.0;
 
 /// A term at a place, with the values of its shapes that the test liked best.
 #[derive(Debug, Clone)]
@@ -122,6 +128,7 @@ pub(crate) fn screen(
         })
         .flatten()
         .collect();
+    let peaks = peaks(study, fit, recordings);
     // All terms at all arguments that some place takes.
     let mut instances: Vec<Instance> = Vec::new();
     for term in TERMS {
@@ -144,7 +151,7 @@ pub(crate) fn screen(
                 .collect()
         };
         for argument in candidates {
-            for shapes in grid(term, argument.map(|a| &arguments[a]), recordings) {
+            for shapes in grid(term, argument.map(|a| &arguments[a]), recordings, &peaks) {
                 instances.push(Instance {
                     term,
                     argument,
@@ -278,6 +285,35 @@ pub(crate) fn screen(
         tests,
         arguments,
     })
+}
+
+/// Frequencies in rad/s at which the whitened residual has most power, the strongest of each output; those of fewer periods than
+/// [`LEAST_PERIODS`] in a recording are trends.
+fn peaks(study: &Study, fit: &Fit, recordings: &[PlantRecording]) -> Vec<f64> {
+    let Some(residual) = study.residual(fit) else {
+        return vec![];
+    };
+    let whitened = fit.noise.whiten(&residual, study.mask());
+    let (l, h) = (study.outputs(), recordings[0].sample_time);
+    let mut found = Vec::new();
+    for o in 0..l {
+        let power = spectrum(&whitened, l, o, h);
+        let least = LEAST_PERIODS / study.duration();
+        let mut of_output: Vec<(f64, f64)> = power
+            .windows(3)
+            .filter(|w| w[1].0 >= least && w[1].1 > w[0].1 && w[1].1 >= w[2].1)
+            .map(|w| {
+                // The vertex of the parabola through three values of the window's main lobe.
+                let bend = w[0].1 - 2.0 * w[1].1 + w[2].1;
+                let shift = 0.5 * (w[0].1 - w[2].1) / bend.min(-f64::MIN_POSITIVE);
+                (w[1].1, w[1].0 + shift.clamp(-0.5, 0.5) * (w[1].0 - w[0].0))
+            })
+            .collect();
+        of_output.sort_by(|a, b| b.0.total_cmp(&a.0));
+        of_output.truncate(PEAKS);
+        found.extend(of_output.iter().map(|p| 2.0 * std::f64::consts::PI * p.1));
+    }
+    found
 }
 
 /// Of the best leads that do the same to the recording, the most specific one; best first.

@@ -42,6 +42,12 @@ pub(super) const THOROUGH: Effort = Effort {
     settled: 0.05,
     attempts: 8,
 };
+/// Effort where fits are compared before the best of them are finished.
+const COMPARED: Effort = Effort {
+    iterations: 10,
+    settled: 0.5,
+    attempts: 6,
+};
 pub(super) const ROUNDS: usize = 2;
 /// Gain in Schwarz's criterion that is needed, beyond the penalty for what was searched: odds of e^8 (math/physics.md).
 pub(crate) const NEEDED: f64 = 16.0;
@@ -292,7 +298,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
                 .with_most_steps(GLANCED_STEPS);
             let inner = study.of(&rough, &options).ok()?;
             let start = made.from(from, parameters, states, outputs);
-            let fitted = inner.refit(&start, 0, GLANCE)?;
+            let fitted = inner.glance(&start, GLANCE)?;
             Some((from.deviance - fitted.deviance, lead, i, made, fitted))
         })
         .collect();
@@ -326,7 +332,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
                 .plant
                 .clone()
                 .with_accuracy(GLANCED_ACCURACY)
-                .with_most_steps(MOST_STEPS);
+                .with_most_steps(GLANCED_STEPS);
             let inner = study.of(&rough, &options).ok()?;
             // Where an observer had to follow what was missing, a free run may do now.
             let mut starts = vec![from.clone()];
@@ -343,7 +349,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
             }
             let best = starts
                 .iter()
-                .filter_map(|start| inner.refit(start, 1, THOROUGH))
+                .filter_map(|start| inner.compare(start, COMPARED))
                 .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
             let gain = fit.criterion - best.criterion - searched(&lead, recordings);
             let argument = lead.argument.map(|a| &arguments[a]);

@@ -12,7 +12,12 @@ const TERM_ACCURACY: f64 = 1e-4;
 const FAST: f64 = 5.0;
 
 /// Values that a shape's search starts from.
-fn starts(shape: Starts, argument: Option<&Argument>, recordings: &[PlantRecording]) -> Vec<f64> {
+fn starts(
+    shape: Starts,
+    argument: Option<&Argument>,
+    recordings: &[PlantRecording],
+    peaks: &[f64],
+) -> Vec<f64> {
     let h = recordings.first().map_or(1.0, |r| r.sample_time);
     let samples = recordings
         .iter()
@@ -37,18 +42,20 @@ fn starts(shape: Starts, argument: Option<&Argument>, recordings: &[PlantRecordi
         Starts::Samples(counts) => counts.iter().map(|c| c * h).collect(),
         Starts::Moved(counts) => of(counts, &|a, n| n * a.spread() * h),
         Starts::Values(values) | Starts::Share(values) => values.to_vec(),
+        Starts::Peaks => peaks.to_vec(),
     }
 }
 
-/// The combinations of start values of all shapes.
+/// The combinations of start values of all shapes; `peaks` are frequencies in rad/s.
 pub(super) fn grid(
     term: &Term,
     argument: Option<&Argument>,
     recordings: &[PlantRecording],
+    peaks: &[f64],
 ) -> Vec<Vec<f64>> {
     let mut all: Vec<Vec<f64>> = vec![vec![]];
     for shape in term.shapes {
-        let values = starts(shape.starts, argument, recordings);
+        let values = starts(shape.starts, argument, recordings, peaks);
         all = all
             .into_iter()
             .flat_map(|head| {

@@ -15,7 +15,18 @@ use crate::physics::simulation::{Direction, Observer, Plan, Point, Trajectory};
 pub(super) struct Runs {
     at: Vec<f64>,
     plans: Vec<Plan>,
+    states: Vec<Series>,
     residual: Series,
+}
+
+/// How derivatives by the free numbers are computed in a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Slopes {
+    /// Approximately where the plant can; exactly once that finds nothing better.
+    FrozenFirst,
+    /// Approximately where the plant can.
+    Frozen,
+    Exact,
 }
 
 /// A run of each recording.
@@ -45,6 +56,9 @@ pub(super) struct Deviance<'p, 'a> {
     problem: &'p Problem<'a>,
     form: Form,
     pub noise: Noise,
+    /// True when the gain of the observer stays as it is: its derivatives are not computed.
+    pub gain_held: bool,
+    pub slopes: Slopes,
     last: Option<Runs>,
     accepted: Option<Runs>,
 }
@@ -55,6 +69,8 @@ impl<'p, 'a> Deviance<'p, 'a> {
             problem,
             form,
             noise,
+            gain_held: false,
+            slopes: Slopes::FrozenFirst,
             last: None,
             accepted: None,
         }
@@ -86,10 +102,11 @@ impl<'p, 'a> Deviance<'p, 'a> {
                 );
             }
         }
-        let plans = trajectories.into_iter().map(|t| t.plan).collect();
+        let (plans, states) = trajectories.into_iter().map(|t| (t.plan, t.states)).unzip();
         Some(Runs {
             at: point.to_vec(),
             plans,
+            states,
             residual,
         })
     }
@@ -132,14 +149,14 @@ impl<'p, 'a> Deviance<'p, 'a> {
         reason = "a direction is a column of every output"
     )]
     /// Whitened derivatives of the predictions: a column for each free number.
-    fn jacobian(&self, runs: &Runs) -> Option<DMatrix<f64>> {
+    fn jacobian(&self, runs: &Runs, slopes: Slopes) -> Option<DMatrix<f64>> {
         let problem = self.problem;
         let gain = self.gain(&runs.at);
         let (n, l) = (problem.states(), problem.outputs());
         let parameters = problem.free.iter().map(|&i| Direction::Parameter(i));
         let starts = problem.starts.iter().map(|&i| Direction::Start(i));
         let mut directions: Vec<Direction> = parameters.chain(starts).collect();
-        if gain.is_some() {
+        if gain.is_some() && !self.gain_held {
             directions.extend((0..n).flat_map(|i| (0..l).map(move |j| Direction::Gain(i, j))));
         }
         let (p, s, count) = (
@@ -153,7 +170,16 @@ impl<'p, 'a> Deviance<'p, 'a> {
         let points = problem.points(&runs.at);
         let columns = problem.columns();
         let prepared = prepare(problem, &points, &columns, gain.as_ref(), &runs.plans);
-        let slopes = problem.plant.slopes(&prepared, &directions)?;
+        let frozen = match slopes {
+            Slopes::Exact => None,
+            _ => problem
+                .plant
+                .frozen_slopes(&prepared, &runs.states, &directions),
+        };
+        let slopes = match frozen {
+            Some(slopes) => slopes,
+            None => problem.plant.slopes(&prepared, &directions)?,
+        };
         for (r, slopes) in slopes.iter().enumerate() {
             let mask = &problem.mask[r * l..(r + 1) * l];
             let mut height = 0;
@@ -180,7 +206,7 @@ impl<'p, 'a> Deviance<'p, 'a> {
     /// Whitened derivatives of the predictions at a point: a row for each value that counts, a column for each free number.
     pub fn derivatives(&mut self, point: &[f64]) -> Option<DMatrix<f64>> {
         let runs = self.at(point)?;
-        self.jacobian(&runs)
+        self.jacobian(&runs, Slopes::Exact)
     }
 
     /// Covariances of the free numbers.
@@ -189,7 +215,7 @@ impl<'p, 'a> Deviance<'p, 'a> {
         let nothing_known = || DMatrix::from_diagonal_element(m, m, f64::INFINITY);
         let jacobian = self
             .at(point)
-            .and_then(|runs| Some((self.jacobian(&runs)?, runs)));
+            .and_then(|runs| Some((self.jacobian(&runs, Slopes::Exact)?, runs)));
         let Some((plant, runs)) = jacobian else {
             return Covariances {
                 joint: nothing_known(),
@@ -273,7 +299,7 @@ impl Objective for Deviance<'_, '_> {
 
     fn curvature(&mut self, point: &[f64]) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let runs = self.at(point)?;
-        let jacobian = self.jacobian(&runs)?;
+        let jacobian = self.jacobian(&runs, self.slopes)?;
         let e = self.noise.whiten_kept(&runs.residual, &self.problem.mask);
         let weights: Vec<f64> = e.iter().map(|&e| self.noise.weight(e)).collect();
         let mut weighted = jacobian.clone();
@@ -282,6 +308,18 @@ impl Objective for Deviance<'_, '_> {
         }
         let descent = weighted.tr_mul(&DVector::from_vec(e));
         Some((weighted.tr_mul(&jacobian), descent))
+    }
+
+    fn approximate(&self) -> bool {
+        self.slopes != Slopes::Exact
+    }
+
+    fn refine(&mut self) -> bool {
+        let refined = self.slopes == Slopes::FrozenFirst;
+        if refined {
+            self.slopes = Slopes::Exact;
+        }
+        refined
     }
 }
 

@@ -9,6 +9,14 @@ pub(super) trait Objective {
     /// Curvature (half the Hessian's Gauss-Newton part) and descent direction (minus half the gradient) at the point that was
     /// accepted last.
     fn curvature(&mut self, point: &[f64]) -> Option<(DMatrix<f64>, DVector<f64>)>;
+    /// Whether curvature and descent are approximate.
+    fn approximate(&self) -> bool {
+        false
+    }
+    /// Makes them exact from now on; false where nothing changes.
+    fn refine(&mut self) -> bool {
+        false
+    }
 }
 
 /// Bounds of a free number, and a magnitude for one whose value is 0.
@@ -36,6 +44,8 @@ pub(super) const RIDGE: f64 = 1e-10;
 const DAMPING: f64 = 1e-3;
 const LESS: f64 = 0.2;
 const MORE: f64 = 5.0;
+/// ... with approximate derivatives: where these lead nowhere, exact ones are better than more damping.
+const APPROXIMATE_ATTEMPTS: usize = 3;
 /// Attempts at one step of a search that should end at a minimum.
 pub(crate) const ATTEMPTS: usize = 12;
 
@@ -54,7 +64,12 @@ pub(super) fn minimise(
         };
         let before = deviance;
         let mut moved = false;
-        for _ in 0..effort.attempts {
+        let attempts = if objective.approximate() {
+            effort.attempts.min(APPROXIMATE_ATTEMPTS)
+        } else {
+            effort.attempts
+        };
+        for _ in 0..attempts {
             let Some(step) = step(&curvature, &descent, point, ranges, damping) else {
                 damping *= MORE;
                 continue;
@@ -80,7 +95,10 @@ pub(super) fn minimise(
             }
         }
         if !moved || before - deviance < effort.settled {
-            break;
+            if !objective.refine() {
+                break;
+            }
+            damping = DAMPING;
         }
     }
     // The objective must stand at the point that is given back.

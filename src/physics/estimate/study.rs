@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::deviance::Deviance;
+use super::deviance::{Deviance, Slopes};
 use super::free_run::{follows, white_fit};
 use super::observer::unbounded;
 use super::optimise::{Effort, minimise};
@@ -80,8 +80,13 @@ impl<'a> Study<'a> {
 
     /// Least squares in free run from a point.
     pub fn least_squares(&self, from: &[f64]) -> Option<Fit> {
+        self.least_squares_with(from, SEARCH)
+    }
+
+    /// The same with a given effort.
+    pub fn least_squares_with(&self, from: &[f64], effort: Effort) -> Option<Fit> {
         let mut point = from[..self.problem.nominal().len()].to_vec();
-        let deviance = white_fit(&self.problem, &mut point, SEARCH)?;
+        let deviance = white_fit(&self.problem, &mut point, effort)?;
         let objective = Deviance::new(&self.problem, Form::FreeRun, Noise::unit(self.outputs()));
         let noise = objective.rescale(&point)?;
         let fit = Fit {
@@ -106,12 +111,34 @@ impl<'a> Study<'a> {
         })
     }
 
+    /// A fit from a point with the noise and the observer of another: a first comparison of candidates.
+    pub fn glance(&self, from: &Fit, effort: Effort) -> Option<Fit> {
+        self.fit_from(from, 0, effort, (Slopes::Frozen, true))
+    }
+
+    /// The same with an observer and a noise model of its own.
+    pub fn compare(&self, from: &Fit, effort: Effort) -> Option<Fit> {
+        self.fit_from(from, 1, effort, (Slopes::Frozen, false))
+    }
+
     /// A fit from a point with the noise of another, and then `rounds` times with a noise model of its own.
     pub fn refit(&self, from: &Fit, rounds: usize, effort: Effort) -> Option<Fit> {
+        self.fit_from(from, rounds, effort, (Slopes::FrozenFirst, false))
+    }
+
+    fn fit_from(
+        &self,
+        from: &Fit,
+        rounds: usize,
+        effort: Effort,
+        (slopes, gain_held): (Slopes, bool),
+    ) -> Option<Fit> {
         let mut point = from.point.clone();
         let mut ranges = self.problem.ranges();
         ranges.extend(unbounded(point.len() - ranges.len()));
         let mut objective = Deviance::new(&self.problem, from.form, from.noise.clone());
+        objective.gain_held = gain_held;
+        objective.slopes = slopes;
         let mut deviance = minimise(&mut objective, &mut point, &ranges, effort)?;
         for _ in 0..rounds {
             let residual = objective.residual(&point)?;

@@ -20,33 +20,45 @@ impl<const M: usize> Dual<M> {
     /// `self + factor * other`
     #[inline(always)]
     pub fn plus(self, factor: f64, other: &Self) -> Self {
-        Self {
-            value: self.value + factor * other.value,
-            slope: std::array::from_fn(|i| self.slope[i] + factor * other.slope[i]),
+        let mut sum = self;
+        sum.value += factor * other.value;
+        for (s, o) in sum.slope.iter_mut().zip(&other.slope) {
+            *s += factor * o;
         }
+        sum
     }
 
     /// `self + factor * length * other`, for a length with slopes.
     #[inline(always)]
     pub fn plus_product(self, factor: f64, length: &Self, other: &Self) -> Self {
         let (s, t) = (factor * length.value, factor * other.value);
-        Self {
-            value: self.value + s * other.value,
-            slope: std::array::from_fn(|i| {
-                self.slope[i] + s * other.slope[i] + t * length.slope[i]
-            }),
+        let mut sum = self;
+        sum.value += s * other.value;
+        for (to, (o, l)) in sum
+            .slope
+            .iter_mut()
+            .zip(other.slope.iter().zip(&length.slope))
+        {
+            *to = *to + s * o + t * l;
         }
+        sum
     }
 }
 
 /// `s * a`
 #[inline(always)]
 pub(super) fn scaled<const M: usize>(s: f64, a: &[f64; M]) -> [f64; M] {
-    std::array::from_fn(|i| s * a[i])
+    let mut product = *a;
+    product.iter_mut().for_each(|p| *p *= s);
+    product
 }
 
 /// `s * a + t * b`
 #[inline(always)]
 pub(super) fn combined<const M: usize>(s: f64, a: &[f64; M], t: f64, b: &[f64; M]) -> [f64; M] {
-    std::array::from_fn(|i| s * a[i] + t * b[i])
+    let mut sum = *a;
+    for (to, b) in sum.iter_mut().zip(b) {
+        *to = s * *to + t * b;
+    }
+    sum
 }

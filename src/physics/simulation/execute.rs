@@ -21,39 +21,61 @@ fn ramp(z: f64, width: f64) -> (f64, f64) {
     }
 }
 
+/// An instruction and the values that it reads.
+struct Operands<'a, const M: usize> {
+    x: &'a Instruction,
+    frame: &'a Frame<M>,
+}
+
+impl<const M: usize> Operands<'_, M> {
+    #[inline(always)]
+    fn value(&self, slot: u32) -> f64 {
+        self.frame.slot[slot as usize].value
+    }
+
+    #[inline(always)]
+    fn slope(&self, slot: u32) -> &[f64; M] {
+        &self.frame.slot[slot as usize].slope
+    }
+
+    /// A function of the first operand with this value and derivative.
+    #[inline(always)]
+    fn one(&self, value: f64, s: f64) -> Dual<M> {
+        let slope = if self.x.active[0] {
+            scaled(s, self.slope(self.x.a))
+        } else {
+            [0.0; M]
+        };
+        Dual { value, slope }
+    }
+
+    /// A function of two operands, with its derivatives by each; what has no slopes is left out.
+    #[inline(always)]
+    fn two(&self, value: f64, s: f64, t: f64) -> Dual<M> {
+        let (a, b) = (self.x.a, self.x.b);
+        let slope = match (self.x.active[0], self.x.active[1]) {
+            (true, true) => combined(s, self.slope(a), t, self.slope(b)),
+            (true, false) => scaled(s, self.slope(a)),
+            (false, true) => scaled(t, self.slope(b)),
+            (false, false) => [0.0; M],
+        };
+        Dual { value, slope }
+    }
+}
+
 /// Value and slope of one instruction.
 #[inline(always)]
 pub(super) fn execute<const M: usize>(x: &Instruction, frame: &Frame<M>) -> Dual<M> {
-    let value = |slot: u32| frame.slot[slot as usize].value;
-    let slope = |slot: u32| &frame.slot[slot as usize].slope;
-    let (a, b) = (value(x.a), value(x.b));
-    // d = s da + t db, with what has no derivative left out.
-    let both = |s: f64, t: f64| match (x.active[0], x.active[1]) {
-        (true, true) => combined(s, slope(x.a), t, slope(x.b)),
-        (true, false) => scaled(s, slope(x.a)),
-        (false, true) => scaled(t, slope(x.b)),
-        (false, false) => [0.0; M],
-    };
-    let one = |v: f64, s: f64| Dual {
-        value: v,
-        slope: if x.active[0] {
-            scaled(s, slope(x.a))
-        } else {
-            [0.0; M]
-        },
-    };
-    let two = |v: f64, s: f64, t: f64| Dual {
-        value: v,
-        slope: both(s, t),
-    };
+    let of = Operands { x, frame };
+    let (a, b) = (of.value(x.a), of.value(x.b));
     match x.operation {
         Operation::Binary(operator) => match operator {
-            Binary::Add => two(a + b, 1.0, 1.0),
-            Binary::Subtract => two(a - b, 1.0, -1.0),
-            Binary::Multiply => two(a * b, b, a),
+            Binary::Add => of.two(a + b, 1.0, 1.0),
+            Binary::Subtract => of.two(a - b, 1.0, -1.0),
+            Binary::Multiply => of.two(a * b, b, a),
             Binary::Divide => {
                 let q = a / b;
-                two(q, 1.0 / b, -q / b)
+                of.two(q, 1.0 / b, -q / b)
             }
             Binary::Power => {
                 let p = a.powf(b);
@@ -63,7 +85,7 @@ pub(super) fn execute<const M: usize>(x: &Instruction, frame: &Frame<M>) -> Dual
                 } else {
                     0.0
                 };
-                two(
+                of.two(
                     p,
                     if a == 0.0 && b > 0.0 && b < 1.0 {
                         0.0
@@ -80,29 +102,29 @@ pub(super) fn execute<const M: usize>(x: &Instruction, frame: &Frame<M>) -> Dual
                     a >= b
                 };
                 if first {
-                    two(a, 1.0, 0.0)
+                    of.two(a, 1.0, 0.0)
                 } else {
-                    two(b, 0.0, 1.0)
+                    of.two(b, 0.0, 1.0)
                 }
             }
             Binary::Atan2 => {
                 let r = a * a + b * b;
                 let g = if r > 0.0 { 1.0 / r } else { 0.0 };
-                two(a.atan2(b), b * g, -a * g)
+                of.two(a.atan2(b), b * g, -a * g)
             }
-            Binary::And => two(a * b, b, a),
-            Binary::Or => two(a + b - a * b, 1.0 - b, 1.0 - a),
+            Binary::And => of.two(a * b, b, a),
+            Binary::Or => of.two(a + b - a * b, 1.0 - b, 1.0 - a),
             Binary::Equal => Dual::constant(f64::from(a == b)),
             Binary::NotEqual => Dual::constant(f64::from(a != b)),
             Binary::Less | Binary::LessOrEqual | Binary::Greater | Binary::GreaterOrEqual => {
                 Dual::constant(f64::NAN) // compiled to `Switch`
             }
         },
-        Operation::Negate => one(-a, -1.0),
-        Operation::Not => one(1.0 - a, -1.0),
+        Operation::Negate => of.one(-a, -1.0),
+        Operation::Not => of.one(1.0 - a, -1.0),
         Operation::PowerInteger(n) => match n {
-            2 => one(a * a, 2.0 * a),
-            _ => one(
+            2 => of.one(a * a, 2.0 * a),
+            _ => of.one(
                 a.powi(n),
                 if n == 0 {
                     0.0
@@ -117,7 +139,7 @@ pub(super) fn execute<const M: usize>(x: &Instruction, frame: &Frame<M>) -> Dual
                 return Dual::constant(0.0);
             }
             let (r, s) = ramp(a, width);
-            one(2.0 * r - 1.0, 2.0 * s)
+            of.one(2.0 * r - 1.0, 2.0 * s)
         }
         Operation::Switch { index, less, equal } => {
             let width = frame.width[index as usize];
@@ -126,13 +148,13 @@ pub(super) fn execute<const M: usize>(x: &Instruction, frame: &Frame<M>) -> Dual
             }
             let (r, s) = ramp(if less { b - a } else { a - b }, width);
             let s = if less { -s } else { s };
-            two(r, s, -s)
+            of.two(r, s, -s)
         }
         Operation::If => {
-            let (b, c) = (value(x.b), value(x.c));
+            let (b, c) = (of.value(x.b), of.value(x.c));
             let side = |slot: u32, active: bool, v: f64| Dual {
                 value: v,
-                slope: if active { *slope(slot) } else { [0.0; M] },
+                slope: if active { *of.slope(slot) } else { [0.0; M] },
             };
             // On the ramp a side that is not defined there (`if h > 0 then sqrt(h) else 0`) does not count.
             if a >= 1.0 || (a >= 0.5 && !c.is_finite()) {
@@ -147,7 +169,7 @@ pub(super) fn execute<const M: usize>(x: &Instruction, frame: &Frame<M>) -> Dual
                     (x.active[2], x.c, 1.0 - a),
                 ] {
                     if on {
-                        let s = slope(slot);
+                        let s = of.slope(slot);
                         for i in 0..M {
                             d[i] += weight * s[i];
                         }
@@ -160,33 +182,33 @@ pub(super) fn execute<const M: usize>(x: &Instruction, frame: &Frame<M>) -> Dual
             }
         }
         Operation::Call(f) => match f {
-            Function::Sin => one(a.sin(), a.cos()),
-            Function::Cos => one(a.cos(), -a.sin()),
+            Function::Sin => of.one(a.sin(), a.cos()),
+            Function::Cos => of.one(a.cos(), -a.sin()),
             Function::Tan => {
                 let t = a.tan();
-                one(t, 1.0 + t * t)
+                of.one(t, 1.0 + t * t)
             }
-            Function::Asin => one(a.asin(), 1.0 / (1.0 - a * a).sqrt()),
-            Function::Acos => one(a.acos(), -1.0 / (1.0 - a * a).sqrt()),
-            Function::Atan => one(a.atan(), 1.0 / (1.0 + a * a)),
-            Function::Sinh => one(a.sinh(), a.cosh()),
-            Function::Cosh => one(a.cosh(), a.sinh()),
+            Function::Asin => of.one(a.asin(), 1.0 / (1.0 - a * a).sqrt()),
+            Function::Acos => of.one(a.acos(), -1.0 / (1.0 - a * a).sqrt()),
+            Function::Atan => of.one(a.atan(), 1.0 / (1.0 + a * a)),
+            Function::Sinh => of.one(a.sinh(), a.cosh()),
+            Function::Cosh => of.one(a.cosh(), a.sinh()),
             Function::Tanh => {
                 let t = a.tanh();
-                one(t, 1.0 - t * t)
+                of.one(t, 1.0 - t * t)
             }
             Function::Exp => {
                 let e = a.exp();
-                one(e, e)
+                of.one(e, e)
             }
-            Function::Log => one(a.ln(), 1.0 / a),
-            Function::Log10 => one(a.log10(), std::f64::consts::LOG10_E / a),
+            Function::Log => of.one(a.ln(), 1.0 / a),
+            Function::Log10 => of.one(a.log10(), std::f64::consts::LOG10_E / a),
             Function::Sqrt => {
                 let r = a.sqrt();
                 // At an empty tank the slope is infinite; the flow is zero on both sides of `sqrt(max(h, 0))`.
-                one(r, if r > 0.0 { 0.5 / r } else { 0.0 })
+                of.one(r, if r > 0.0 { 0.5 / r } else { 0.0 })
             }
-            Function::Abs => one(
+            Function::Abs => of.one(
                 a.abs(),
                 if a > 0.0 {
                     1.0

@@ -198,6 +198,30 @@ impl<'a, const M: usize> Field<'a, M> {
         derivative: &mut [f64],
         jacobian: &mut [f64],
     ) {
+        let tape = self.tape;
+        self.linearise_slots(time, x, &tape.derivatives, derivative, jacobian);
+    }
+
+    /// Outputs and their Jacobian by the states, likewise.
+    pub fn linearise_outputs(
+        &mut self,
+        time: &Dual<M>,
+        x: &[f64],
+        value: &mut [f64],
+        jacobian: &mut [f64],
+    ) {
+        let tape = self.tape;
+        self.linearise_slots(time, x, &tape.outputs, value, jacobian);
+    }
+
+    fn linearise_slots(
+        &mut self,
+        time: &Dual<M>,
+        x: &[f64],
+        slots: &[usize],
+        value: &mut [f64],
+        jacobian: &mut [f64],
+    ) {
         self.place(time);
         let n = x.len();
         let (tape, frame) = (self.tape, &mut self.jacobian);
@@ -221,8 +245,8 @@ impl<'a, const M: usize> Field<'a, M> {
                 frame.slot[slot] = dual;
             }
             tape.run_states(frame);
-            for (row, &slot) in tape.derivatives.iter().enumerate() {
-                derivative[row] = frame.slot[slot].value;
+            for (row, &slot) in slots.iter().enumerate() {
+                value[row] = frame.slot[slot].value;
                 for column in first..(first + LANES).min(n) {
                     jacobian[row * n + column] = frame.slot[slot].slope[column - first];
                 }

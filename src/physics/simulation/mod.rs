@@ -8,6 +8,7 @@ mod dense;
 mod dual;
 mod execute;
 mod field;
+mod frozen;
 mod integrator;
 mod linear;
 mod linearise;

@@ -218,13 +218,13 @@ pub struct Plant {
     /// Its equations.
     pub spec: ModelSpec,
     pub(super) tape: Tape,
-    linearity: Linearity,
+    pub(super) linearity: Linearity,
     /// Values of the parameters, where they are not those of the text.
     nominal: Option<Vec<f64>>,
     /// Error of a step as a part of how far a state has moved.
     pub(super) accuracy: f64,
     /// Steps a sample that a run may take on average, where fewer are allowed than is usual.
-    most_steps: Option<usize>,
+    pub(super) most_steps: Option<usize>,
 }
 
 impl Plant {
@@ -312,7 +312,6 @@ impl Plant {
         observer: Option<&Observer>,
     ) -> Result<Trajectory, SimulationError> {
         let most = MOST_STEPS.max(MOST_STEPS_A_SAMPLE * excitation.length);
-        let most = most.min(self.allowed_steps(excitation));
         let moving = self.tape.switches.iter().any(|s| s.moves);
         if !moving {
             return self.run_choosing(point, excitation, observer, Some(&[]), most);
@@ -336,13 +335,7 @@ impl Plant {
         plan: &Plan,
     ) -> Result<Trajectory, SimulationError> {
         let most = (MOST_REPEATED_A_SAMPLE * excitation.length).max(MOST_REPEATED * plan.steps());
-        let most = most.min(self.allowed_steps(excitation));
         self.run_choosing(point, excitation, observer, Some(&plan.widths), most)
-    }
-
-    fn allowed_steps(&self, excitation: &Excitation) -> usize {
-        self.most_steps
-            .map_or(usize::MAX, |steps| steps * excitation.length)
     }
 
     fn check(&self, excitation: &Excitation) -> Result<(), SimulationError> {
@@ -363,7 +356,7 @@ impl Plant {
         })
     }
 
-    fn integrator<'a, const M: usize>(
+    pub(super) fn integrator<'a, const M: usize>(
         &'a self,
         point: &Point,
         excitation: &'a Excitation<'a>,

@@ -39,6 +39,10 @@ const ROUGH: u8 = 8;
 const STIFF: u8 = 7;
 /// Step times rate up to which the explicit method is stable (2.8 for rates that are real).
 const STABLE: f64 = 2.5;
+/// An implicit step costs about as much as so many explicit ones.
+const IMPLICIT_COST: usize = 8;
+/// A run that may take so many steps a sample may take those of so many samples more at any time: what is hopeless ends early.
+const GRACE: usize = 200;
 /// After so many stiff samples the explicit method is tried again.
 const AGAIN: usize = 32;
 /// Half width of the ramp of a switch, as a part of the largest value of its argument: far below what a recording shows.
@@ -56,6 +60,8 @@ pub(super) struct StepControl<'p> {
     samples: usize,
     attempts: usize,
     most_attempts: usize,
+    /// Attempts a sample that there may be at any time of the run, where a run is refused that needs more.
+    most_a_sample: Option<usize>,
     depth: u8,
     implicit: bool,
     /// Samples in which the implicit method was used.
@@ -133,6 +139,7 @@ impl<'p> StepControl<'p> {
             samples: 0,
             attempts: 0,
             most_attempts,
+            most_a_sample: plant.most_steps,
             depth: 0,
             implicit: false,
             stiff_samples: 0,
@@ -278,8 +285,14 @@ impl<'p> StepControl<'p> {
             let time = start.plus(share(place), length);
             let step = share(size) * length.value;
             let attempt = self.attempt(integrator, &time, step, depth);
-            self.attempts += 1;
-            if self.attempts > self.most_attempts {
+            self.attempts += match self.most_a_sample {
+                Some(_) if self.implicit => IMPLICIT_COST,
+                _ => 1,
+            };
+            let allowed = self
+                .most_a_sample
+                .map_or(usize::MAX, |most| most.saturating_mul(self.samples + GRACE));
+            if self.attempts > self.most_attempts.min(allowed) {
                 return Err(SimulationError::TooFast {
                     time: time.value,
                     steps: self.attempts,
