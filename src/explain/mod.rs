@@ -34,6 +34,7 @@ mod baseline;
 mod cascade;
 mod changes;
 mod check;
+mod columns;
 mod coordinates;
 mod curve;
 mod data;
