@@ -99,7 +99,7 @@ pub fn explain(
         }
     };
     finding.add(checked.troubles.clone());
-    let explanation = Answer {
+    let mut explanation = Answer {
         recordings,
         known: &known,
         finding: &finding,
@@ -107,7 +107,12 @@ pub fn explain(
         seed: options.seed,
     }
     .say();
-    let settled = explanation.remaining.adequate && explanation.verdict != Verdict::Unexplained;
+    // What a simulator does that neither a linear model nor equations reproduce may be what is left.
+    if !linear && explanation.verdict == Verdict::Named && !explanation.remaining.adequate {
+        explanation.verdict = Verdict::Unexplained;
+    }
+    let settled =
+        !linear || explanation.remaining.adequate && explanation.verdict != Verdict::Unexplained;
     Ok(match (!settled).then(by_equations).flatten() {
         Some(other) if follows_closer(&other, &explanation) => other,
         _ => explanation,

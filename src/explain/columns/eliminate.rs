@@ -40,3 +40,28 @@ pub(super) fn eliminate(
     }
     Some(active.into_iter().map(|i| (i, value[i])).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_of_no_consequence_goes_and_the_others_follow() {
+        // The first column is nearly the second: without it the second takes over its part.
+        let information =
+            DMatrix::from_row_slice(3, 3, &[1.0, 0.99, 0.0, 0.99, 1.0, 0.0, 0.0, 0.0, 1.0]);
+        let kept = eliminate(&information, &[0.1, 2.0, 0.5], 0.01, |_| true).unwrap();
+        let (places, values): (Vec<usize>, Vec<f64>) = kept.into_iter().unzip();
+        assert_eq!(places, [1, 2]);
+        assert!((values[0] - 2.099).abs() < 1e-6 && (values[1] - 0.5).abs() < 1e-9);
+        // What must stay stays, and nothing goes that costs more than is allowed.
+        let all = eliminate(&information, &[0.1, 2.0, 0.5], 0.01, |i| i != 0).unwrap();
+        assert_eq!(all.len(), 3);
+        assert_eq!(
+            eliminate(&information, &[0.1, 2.0, 0.5], 1e-6, |_| true)
+                .unwrap()
+                .len(),
+            3
+        );
+    }
+}

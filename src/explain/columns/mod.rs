@@ -311,3 +311,6 @@ fn combinations(outputs: usize) -> Vec<Vec<usize>> {
     all.retain(|orders| orders.iter().sum::<usize>() > 0);
     all
 }
+
+#[cfg(test)]
+mod tests;

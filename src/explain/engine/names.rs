@@ -301,3 +301,48 @@ pub(super) fn rank_of(spec: &ModelSpec, term: &Term, place: Place, variables: &[
     };
     PLACES * of_name + elsewhere
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::library::TERMS;
+    use super::*;
+    use crate::physics::parse;
+
+    fn name(text: &str, term: &str, at: &str, of: &str) -> &'static str {
+        let spec = parse(text).unwrap();
+        let term = TERMS.iter().find(|t| t.id == term).unwrap();
+        let unknown = |e: &Equation| e.unknown.variable() == spec.find(at).unwrap();
+        let place = spec.equations.iter().position(unknown).unwrap();
+        called(
+            &spec,
+            term,
+            Place::Equation(place),
+            &[spec.find(of).unwrap()],
+        )
+    }
+
+    #[test]
+    fn without_units_what_slows_itself_is_a_velocity() {
+        let bare = "model M input Real u; output Real y; Real w; Real i;
+                    equation der(w) = i - w; der(i) = u - i; y = w; end M;";
+        assert_eq!(name(bare, "signed_square", "w", "w"), "quadratic_drag");
+        assert_eq!(name(bare, "friction", "w", "w"), "coulomb_friction");
+        // Not what another state does, and not what has a unit that is none of a velocity.
+        assert_eq!(name(bare, "signed_square", "w", "i"), "law");
+        let warm = bare.replace("Real w;", "Real w(unit=\"K\");");
+        assert_eq!(name(&warm, "signed_square", "w", "w"), "law");
+    }
+
+    #[test]
+    fn without_units_a_coefficient_that_damps_its_state_may_be_heated() {
+        let spec = parse(
+            "model M parameter Real r = 2; parameter Real b = 1; input Real u; output Real y; Real i;
+             equation der(i) = b*u - r*i; y = i; end M;",
+        )
+        .unwrap();
+        let v = |name: &str| spec.find(name).unwrap();
+        assert!(heats_itself(&spec, v("r"), &[v("i")]));
+        assert!(!heats_itself(&spec, v("b"), &[v("i")]));
+        assert!(!heats_itself(&spec, v("r"), &[v("u")]));
+    }
+}
