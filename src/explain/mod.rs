@@ -38,6 +38,7 @@ mod columns;
 mod coordinates;
 mod curve;
 mod data;
+mod doubt;
 pub mod effects;
 mod engine;
 mod error;

@@ -5,6 +5,7 @@ use super::answer::Answer;
 use super::check::Checked;
 use super::columns;
 use super::data::Data;
+use super::doubt::{doubt, follows_closer};
 use super::effects::{self, Definition};
 use super::error::ExplainError;
 use super::explanation::{Explanation, Verdict};
@@ -107,9 +108,8 @@ pub fn explain(
         seed: options.seed,
     }
     .say();
-    // What a simulator does that neither a linear model nor equations reproduce may be what is left.
-    if !linear && explanation.verdict == Verdict::Named && !explanation.remaining.adequate {
-        explanation.verdict = Verdict::Unexplained;
+    if !linear {
+        doubt(&mut explanation);
     }
     let settled =
         !linear || explanation.remaining.adequate && explanation.verdict != Verdict::Unexplained;
@@ -117,18 +117,6 @@ pub fn explain(
         Some(other) if follows_closer(&other, &explanation) => other,
         _ => explanation,
     })
-}
-
-/// Free runs whose errors differ by less than this part are equally good (the tolerance of the project's score on real
-/// recordings).
-const EQUAL: f64 = 0.02;
-
-/// Whether one explanation names something, and its free run follows the recording closer than that of the other.
-fn follows_closer(one: &Explanation, other: &Explanation) -> bool {
-    let error = |e: &Explanation| e.fit.train.augmented.rmse;
-    one.verdict == Verdict::Named
-        && one.fit.output == other.fit.output
-        && error(one) < (1.0 - EQUAL) * error(other)
 }
 
 /// Whether the finding is an averaged equation of what is no drive, but a mass on a spring.

@@ -313,4 +313,4 @@ fn combinations(outputs: usize) -> Vec<Vec<usize>> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

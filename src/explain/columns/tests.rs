@@ -6,7 +6,7 @@ use rand_distr::StandardNormal;
 
 use super::*;
 use crate::explain::simulation::Simulation;
-use crate::explain::{Options, Verdict, explain};
+use crate::explain::{Explanation, Options, Verdict, explain};
 use crate::log::Log;
 use crate::physics::{Excitation, Point};
 
@@ -140,11 +140,9 @@ fn a_force_between_bodies_has_a_place_of_its_own() {
     assert!(text.contains("common1 = x_state^3;"), "{text}");
 }
 
-#[test]
-fn what_acts_in_the_recording_is_named_and_a_changed_parameter_is_not() {
-    let u = steps(25);
-    let h = 0.05;
-    let simulated = run(PENDULUM, |_| {}, &u, h);
+/// What is said of a pendulum that differs from its simulation by a parameter.
+fn answer(change: &dyn Fn(&mut Point)) -> Explanation {
+    let (u, h) = (steps(25), 0.05);
     let log = |outputs: Vec<Vec<f64>>| Log {
         name: "log".to_owned(),
         sample_time: h,
@@ -155,16 +153,23 @@ fn what_acts_in_the_recording_is_named_and_a_changed_parameter_is_not() {
         output_data: outputs,
         sha256: None,
     };
-    let answer = |change: &dyn Fn(&mut Point)| {
-        let mut recorded = run(PENDULUM, change, &u, h);
-        let mut random = ChaCha8Rng::seed_from_u64(1);
-        for y in &mut recorded[0] {
-            *y += 0.003 * random.sample::<f64, _>(StandardNormal);
-        }
-        let known = Simulation::Outputs(vec![log(simulated.clone())]);
-        explain(&[log(recorded)], &known, &Options::default()).unwrap()
-    };
-    let drag = answer(&|p| p.parameters[2] = 0.3);
+    let known = Simulation::Outputs(vec![log(run(PENDULUM, |_| {}, &u, h))]);
+    let mut recorded = run(PENDULUM, change, &u, h);
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    for y in &mut recorded[0] {
+        *y += 0.003 * random.sample::<f64, _>(StandardNormal);
+    }
+    explain(&[log(recorded)], &known, &Options::default()).unwrap()
+}
+
+/// Of a pendulum with a drag that the simulation leaves out.
+pub(crate) fn drag() -> Explanation {
+    answer(&|p| p.parameters[2] = 0.3)
+}
+
+#[test]
+fn what_acts_in_the_recording_is_named_and_a_changed_parameter_is_not() {
+    let drag = drag();
     assert_eq!(drag.verdict, Verdict::Named, "{:?}", drag.summary);
     assert_eq!(drag.effects[0].effect, "quadratic_drag");
     let plant = drag.plant.unwrap();
