@@ -53,11 +53,6 @@ fn slot(order: usize, power: usize) -> Option<usize> {
     (power <= order).then(|| order - power)
 }
 
-/// Whether a function is of the integral of an input alone.
-fn is_of_store(signal: &Signal) -> bool {
-    matches!(signal, Signal::Function(_, parts) if matches!(parts[..], [Part::Sum(_)]))
-}
-
 impl Chains {
     /// States for the equations of all outputs. A signal enters the chain of an output once for each of its derivatives, and
     /// through the chains of the others.
@@ -117,11 +112,9 @@ impl Chains {
                         l => Row::State(i, l - 1),
                     };
                     let value = entering[first[i] + place];
-                    // No equation holds the highest derivative of a function of states: what is there is rounding.
-                    let rounding = place == 0
-                        && orders[i] > 0
-                        && !matches!(signal, Signal::Input(_))
-                        && !is_of_store(signal);
+                    // No equation holds the highest derivative of a function: what is there is rounding.
+                    let rounding =
+                        place == 0 && orders[i] > 0 && !matches!(signal, Signal::Input(_));
                     if value.abs() > ROUNDING * entering.amax() && !rounding {
                         terms.push(Term {
                             row,
@@ -148,8 +141,7 @@ impl Chains {
     ) -> Vec<(usize, String)> {
         let used = |s: usize| self.terms.iter().filter(|t| t.of == Of::Signal(s)).count();
         let several = (0..signals.all.len())
-            .filter(|&s| matches!(signals.all[s], Signal::Function(..)) && used(s) > 1)
-            .filter(|&s| !is_of_store(&signals.all[s]));
+            .filter(|&s| matches!(signals.all[s], Signal::Function(..)) && used(s) > 1);
         let taken = |name: &String| inputs.iter().chain(outputs).any(|c| c.0.name == *name);
         let names = (1..).map(|n| format!("common{n}")).filter(|n| !taken(n));
         several.zip(names).collect()
@@ -172,7 +164,6 @@ impl Chains {
             Part::Rate(j) if has(Row::State(*j, 0)) => outputs[*j].suffixed("_slope"),
             Part::Rate(j) => state(*j, 1),
             Part::Input(m) => inputs[*m].name(),
-            Part::Sum(m) => inputs[*m].suffixed("_sum"),
         };
         let uses = |wanted: Part| {
             self.terms.iter().any(|t| {
@@ -246,11 +237,6 @@ impl Chains {
                 text += &format!("  Real {}(start={value:e}{unit});\n", state(j, k));
             }
         }
-        let stores: Vec<usize> = (0..inputs.len()).filter(|&m| uses(Part::Sum(m))).collect();
-        for &m in &stores {
-            let name = argument(&Part::Sum(m));
-            text += &format!("  Real {name}(start=0, fixed=true);\n");
-        }
         let all = || 0..self.orders.len();
         for name in all().flat_map(|j| slope(j).into_iter().chain(signal(j))) {
             text += &format!("  Real {name};\n");
@@ -259,10 +245,6 @@ impl Chains {
             text += &format!("  Real {name};\n");
         }
         text += "equation\n";
-        for &m in &stores {
-            let (sum, input) = (argument(&Part::Sum(m)), inputs[m].name());
-            text += &format!("  {:e}*der({sum}) = {input};\n", signals.sum_ranges[m]);
-        }
         for (s, name) in &common {
             if let Signal::Function(form, parts) = &signals.all[*s] {
                 let arguments: Vec<String> = parts.iter().map(argument).collect();

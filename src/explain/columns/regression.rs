@@ -1,7 +1,5 @@
 //! One output's equation: linear terms, and the nonlinear functions that leave least, added one by one or two together.
 
-use std::collections::BTreeMap;
-
 use nalgebra::DMatrix;
 
 use super::eliminate::eliminate;
@@ -96,20 +94,9 @@ fn allowed(signal: &Signal, orders: &[usize]) -> bool {
         Signal::Function(_, parts) => parts.iter().all(|part| match part {
             Part::Output(j) => orders[*j] > 0,
             Part::Rate(j) => orders[*j] > 1,
-            Part::Input(_) | Part::Sum(_) => true,
+            Part::Input(_) => true,
         }),
         _ => true,
-    }
-}
-
-/// The input whose integral a function is of.
-fn store(signal: &Signal) -> Option<usize> {
-    match signal {
-        Signal::Function(_, parts) => parts.iter().find_map(|part| match part {
-            Part::Sum(m) => Some(*m),
-            _ => None,
-        }),
-        _ => None,
     }
 }
 
@@ -125,7 +112,6 @@ pub(super) fn output_equation(
     let target = &regressors.columns[target_column];
     let mut linear: Vec<usize> = regressors.transients().collect();
     let mut functions: Vec<Vec<usize>> = Vec::new();
-    let mut curves: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (s, signal) in signals.all.iter().enumerate() {
         let derivatives: Vec<usize> = match signal {
             Signal::Output(j) => (0..orders[*j])
@@ -133,20 +119,15 @@ pub(super) fn output_equation(
                 .collect(),
             Signal::Input(_) => (0..=order).collect(),
             Signal::One => vec![0],
-            // What is known without the states may act on the output at once.
-            Signal::Function(..) if store(signal).is_some() => (0..=order).collect(),
             Signal::Function(..) if allowed(signal, orders) => (0..order.max(1)).collect(),
             Signal::Function(..) => continue,
         };
         let columns = derivatives.into_iter().map(|k| regressors.column(s, k));
-        match (signal, store(signal)) {
-            // A curve over what a store holds is one function.
-            (_, Some(input)) => curves.entry(input).or_default().extend(columns),
-            (Signal::Function(..), None) => functions.push(columns.collect()),
+        match signal {
+            Signal::Function(..) => functions.push(columns.collect()),
             _ => linear.extend(columns),
         }
     }
-    functions.extend(curves.into_values());
     let empty = Basis {
         regressors,
         orthonormal: vec![],

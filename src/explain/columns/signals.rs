@@ -26,8 +26,6 @@ pub(super) enum Part {
     /// Derivative of an output.
     Rate(usize),
     Input(usize),
-    /// Integral of an input, over its range: what a store holds that nothing else fills or empties, such as a charge.
-    Sum(usize),
 }
 
 /// A signal of the equations.
@@ -48,8 +46,6 @@ enum Domain {
     Signed,
     Positive,
     Angle,
-    /// The integral of an input.
-    Sum,
 }
 
 /// A function of one or two arguments.
@@ -57,7 +53,7 @@ struct Form {
     text: &'static str,
     value: fn(f64, f64) -> f64,
     domain: Domain,
-    /// Two arguments; no rates.
+    /// Two arguments; of two outputs only.
     pair: Option<bool>,
 }
 
@@ -71,7 +67,7 @@ const fn one(text: &'static str, value: fn(f64, f64) -> f64, domain: Domain) -> 
 }
 
 /// Nonlinear functions that the right-hand sides of simulators are made of.
-const FORMS: [Form; 15] = [
+const FORMS: [Form; 10] = [
     one("{a}*abs({a})", |a, _| a * a.abs(), Domain::Any),
     one("{a}^2", |a, _| a * a, Domain::Signed),
     one("{a}^3", |a, _| a.powi(3), Domain::Any),
@@ -88,11 +84,6 @@ const FORMS: [Form; 15] = [
         |a, _| a.max(1e-9).recip(),
         Domain::Positive,
     ),
-    one("{a}", |a, _| a, Domain::Sum),
-    one("{a}^2", |a, _| a * a, Domain::Sum),
-    one("{a}^3", |a, _| a.powi(3), Domain::Sum),
-    one("{a}^4", |a, _| a.powi(4), Domain::Sum),
-    one("{a}^5", |a, _| a.powi(5), Domain::Sum),
     Form {
         text: "{a}*{b}",
         value: |a, b| a * b,
@@ -122,8 +113,6 @@ struct Fine {
     rates: Vec<Vec<f64>>,
     /// Inputs at the left and right end of each part of a sample.
     inputs: Vec<[Vec<f64>; 2]>,
-    /// Integrals of the inputs.
-    sums: Vec<Vec<f64>>,
 }
 
 /// Second derivatives at the knots of the natural cubic spline through equidistant values.
@@ -177,25 +166,14 @@ impl Fine {
                 })
                 .collect()
         };
-        let inputs: Vec<[Vec<f64>; 2]> = recording
-            .inputs
-            .iter()
-            .map(|u| [end(u, 0), end(u, 1)])
-            .collect();
-        let part = recording.sample_time / PARTS as f64;
-        let sum = |[left, right]: &[Vec<f64>; 2]| -> Vec<f64> {
-            let mut total = 0.0;
-            let each = left.iter().zip(right).map(|(l, r)| {
-                total += 0.5 * (l + r) * part;
-                total
-            });
-            std::iter::once(0.0).chain(each).collect()
-        };
         Self {
-            sums: inputs.iter().map(sum).collect(),
             outputs,
             rates,
-            inputs,
+            inputs: recording
+                .inputs
+                .iter()
+                .map(|u| [end(u, 0), end(u, 1)])
+                .collect(),
         }
     }
 
@@ -206,7 +184,6 @@ impl Fine {
             Part::Output(j) => &self.outputs[j][between(&self.outputs[j])],
             Part::Rate(j) => &self.rates[j][between(&self.rates[j])],
             Part::Input(m) => &self.inputs[m][side],
-            Part::Sum(m) => &self.sums[m][between(&self.sums[m])],
         }
     }
 
@@ -244,8 +221,6 @@ fn low_pass([left, right]: [&[f64]; 2], lambda: f64, h: f64) -> Vec<f64> {
 pub(super) struct Signals {
     pub all: Vec<Signal>,
     fine: Vec<Fine>,
-    /// Ranges of the integrals of inputs, which they are divided by.
-    pub sum_ranges: Vec<f64>,
     sample_time: f64,
     samples: Vec<usize>,
     pub outputs: usize,
@@ -291,19 +266,7 @@ impl Signals {
         if outputs == 0 || !recordings.iter().all(whole) {
             return None;
         }
-        let mut fine: Vec<Fine> = recordings.iter().map(|r| Fine::new(r, hold)).collect();
-        let sum_ranges: Vec<f64> = (0..inputs)
-            .map(|m| {
-                let all = fine.iter().flat_map(|f| f.sums[m].iter());
-                all.fold(0.0_f64, |most, v| most.max(v.abs()))
-            })
-            .collect();
-        for f in &mut fine {
-            for (sum, size) in f.sums.iter_mut().zip(&sum_ranges) {
-                sum.iter_mut()
-                    .for_each(|v| *v /= size.max(f64::MIN_POSITIVE));
-            }
-        }
+        let fine: Vec<Fine> = recordings.iter().map(|r| Fine::new(r, hold)).collect();
         let of = |part: Part| range(fine.iter().flat_map(|f| f.part(part, 0).iter().copied()));
         let mut all: Vec<Signal> = (0..outputs).map(Signal::Output).collect();
         all.extend((0..inputs).map(Signal::Input));
@@ -313,8 +276,6 @@ impl Signals {
             parts.extend([Part::Output(j), Part::Rate(j)]);
         }
         parts.extend((0..inputs).map(Part::Input));
-        let known = parts.len();
-        parts.extend((0..inputs).map(Part::Sum));
         for (form, of_form) in FORMS.iter().enumerate() {
             for (i, &a) in parts.iter().enumerate() {
                 let (least, most) = of(a);
@@ -322,8 +283,7 @@ impl Signals {
                 match of_form.pair {
                     None => {
                         let fits = match of_form.domain {
-                            domain if (i >= known) != (domain == Domain::Sum) => false,
-                            Domain::Any | Domain::Sum => true,
+                            Domain::Any => true,
                             Domain::Signed => least < 0.0 && most > 0.0,
                             Domain::Positive => {
                                 matches!(a, Part::Output(_)) && least > -POSITIVE * (most - least)
@@ -337,11 +297,11 @@ impl Signals {
                             all.push(Signal::Function(form, vec![a]));
                         }
                     }
-                    Some(of_levels) => {
-                        for &b in parts[..known].iter().skip(i + 1) {
-                            let two = !matches!(a, Part::Rate(_)) && !matches!(b, Part::Rate(_));
+                    Some(of_outputs) => {
+                        for &b in &parts[i + 1..] {
+                            let two = matches!((a, b), (Part::Output(_), Part::Output(_)));
                             let (low, high) = of(b);
-                            if moves && high > low && (two || !of_levels) {
+                            if moves && high > low && (two || !of_outputs) {
                                 all.push(Signal::Function(form, vec![a, b]));
                             }
                         }
@@ -352,7 +312,6 @@ impl Signals {
         Some(Self {
             all,
             fine,
-            sum_ranges,
             sample_time: first.sample_time,
             samples: recordings.iter().map(|r| r.outputs[0].len()).collect(),
             outputs,

@@ -16,11 +16,11 @@ const PENDULUM: &str =
     "model Pendulum parameter Real d = 0.4; parameter Real k = 9.0; parameter Real c = 0.0;
   input Real u; output Real y; Real phi(start=0.2); Real w(start=0);
 equation
-  der(phi) = w; der(w) = 6*u - d*w - k*sin(phi) - c*w*abs(w); y = phi;
+  der(phi) = w; der(w) = 3*u - d*w - k*sin(phi) - c*w*abs(w); y = phi;
 end Pendulum;";
 
 const TANKS: &str = "model Tanks parameter Real c = 0.3; input Real u; output Real y1; output Real y2;
-  Real h1(start=1); Real h2(start=0.8);
+  Real h1(start=1); Real h2(start=0.6);
 equation
   der(h1) = u - c*sqrt(max(h1, 0)); der(h2) = c*sqrt(max(h1, 0)) - 0.4*sqrt(max(h2, 0)); y1 = h1; y2 = h2;
 end Tanks;";
