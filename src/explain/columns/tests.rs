@@ -34,7 +34,7 @@ end Coil;";
 
 /// Two bodies with a force between them, which acts on both.
 const BODIES: &str = "model Bodies input Real F; output Real a; output Real x; Real z1; Real v1; Real z2; Real v2;
-  Real f = 20*(z1 - z2) + 2*(v1 - v2) + 30*(z1 - z2)^3 - F;
+  Real f = 20*(z1 - z2) + 2*(v1 - v2) + 2000*(z1 - z2)^3 - F;
 equation
   der(z1) = v1; der(v1) = -f - 3*z1; der(z2) = v2; der(v2) = 4*f - 50*z2; a = -f - 3*z1; x = z1 - z2;
 end Bodies;";
@@ -116,7 +116,7 @@ fn a_pendulum_is_found_with_its_sine_and_no_more() {
 
 #[test]
 fn tanks_are_found_with_the_roots_of_their_levels() {
-    let u: Vec<f64> = steps(40).iter().map(|u| 0.3 + 0.1 * u).collect();
+    let u: Vec<f64> = steps(40).iter().map(|u| 0.5 + 0.4 * u).collect();
     let found = found(TANKS, &["y1", "y2"], &u, 0.2);
     assert!(found.misfit < REPRODUCED, "{}", found.misfit);
     assert_eq!(found.plant.spec.states().len(), 2);
