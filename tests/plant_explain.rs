@@ -151,6 +151,28 @@ fn a_contact_that_lasts_a_few_samples_is_named() {
 }
 
 #[test]
+fn a_force_that_repeats_in_time_is_named_with_its_frequency() {
+    let folder = Folder::new();
+    folder.text("cart.mo", CART);
+    let force = |_: f64, _: f64, t: f64| 0.8 * (3.7 * t + 1.0).sin();
+    record(&folder, "log.csv", 1.1, force, 6);
+    let said = explained(&folder, "log.csv");
+    assert_eq!(said["verdict"], "named", "{}", said["summary"]);
+    let effect = &said["effects"][0];
+    assert_eq!(effect["effect"], "periodic_disturbance");
+    assert_eq!(effect["enters"], "v");
+    let frequency = &effect["parameters"]["periodic_w"];
+    let (value, std) = (
+        frequency["value"].as_f64().unwrap(),
+        frequency["std"].as_f64().unwrap(),
+    );
+    assert!(
+        (value - 3.7).abs() < 4.0 * std && std < 0.02,
+        "{value} +- {std}"
+    );
+}
+
+#[test]
 fn effects_are_left_out_or_tried_alone() {
     let folder = Folder::new();
     folder.text("cart.mo", CART);
