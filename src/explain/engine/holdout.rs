@@ -162,7 +162,7 @@ pub(super) fn held_out(
                         point,
                         ..fit.clone()
                     };
-                    training.refit(&from, 1, AGAIN)?
+                    training.compare(&from, AGAIN)?
                 }
             };
             let fitted = released.with_values(&again.point[..parameters]);

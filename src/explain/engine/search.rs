@@ -9,6 +9,7 @@ use super::finish::finished;
 use super::fitted::{Fitted, TIE, order, searched, with_more};
 use super::holdout::HeldOut;
 use super::hypothesis::{Ground, Trial, trials};
+use super::library::Port;
 use super::names::{SPECIFIC, family, named, rank_of};
 use super::scope::Scope;
 use super::screen::{Lead, Screen, screen};
@@ -209,6 +210,13 @@ fn improved(stage: &Stage, fitted: &[Fitted]) -> Option<Fit> {
         })
         .filter(|again| again.criterion < stage.fit.criterion - BETTER)
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+}
+
+/// Whether a term is a function of the same variables as another, somewhere in the plant: it may be the part of the same effect
+/// that the formula of the other leaves (math/physics.md, "Fits and decision", 8).
+fn repeats(second: &Fitted, first: &Fitted) -> bool {
+    let inside = |f: &Fitted| matches!(f.lead.term.port, Port::Equation | Port::Parameter);
+    !second.depends.is_empty() && second.depends == first.depends && inside(second) && inside(first)
 }
 
 /// Fits the leads of a plant; best first. Also the strongest test, and how many there were.
@@ -505,6 +513,7 @@ pub(crate) fn search(
                 f.hypothesis.is_some()
                     || !matches!(id, "law" | "cross_coupling" | "viscous_friction")
                         && family(id) != family(named(&plant.spec, first))
+                        && !repeats(f, first)
             })
         };
         let best = fitted.first().filter(new);

@@ -8,8 +8,9 @@ use super::optimise::{Effort, Range, minimise};
 use super::problem::Problem;
 use super::{Fit, Form, ROUND, ROUNDS, SEARCH, SETTLED};
 use crate::noise::{Colours, Noise};
-use crate::physics::simulation::Excitation;
-use crate::physics::simulation::LinearPlant;
+use crate::physics::expression::{Node, VariableId};
+use crate::physics::simulation::{Excitation, LinearPlant, Trajectory};
+use crate::physics::spec::{ModelSpec, Unknown};
 
 /// Process noise of a sample as a part of the spread of each state, from which gains are computed to start from.
 const DIFFUSION: [f64; 4] = [1e-3, 1e-2, 1e-1, 1.0];
@@ -113,8 +114,8 @@ pub(super) fn unbounded(count: usize) -> impl Iterator<Item = Range> {
 /// Whether the plant, linearised at its mean, forgets its state more slowly than the longest recording lasts, or never.
 pub(super) fn integrates(problem: &Problem) -> bool {
     let mut slow = false;
-    problem.each(|excitation, _| {
-        let Some((linear, _, _)) = mean_linearisation(problem, excitation) else {
+    problem.each(|excitation, outputs| {
+        let Some((linear, _, _)) = mean_linearisation(problem, excitation, outputs) else {
             return;
         };
         let length = excitation.sample_time * excitation.length as f64;
@@ -124,11 +125,13 @@ pub(super) fn integrates(problem: &Problem) -> bool {
     slow
 }
 
-/// The plant linearised at the mean of its free run with the values of the text, that mean, and the spread about it; at the
-/// start values where there is no free run.
+/// The plant linearised at the mean of its free run with the values of the text, that mean, and the spread about it. Where the
+/// free run does not follow the recording, as that of an unstable plant, both are what the outputs show of the states, and start
+/// values.
 fn mean_linearisation(
     problem: &Problem,
     excitation: &Excitation,
+    outputs: &[&[f64]],
 ) -> Option<(LinearPlant, Vec<f64>, Vec<f64>)> {
     let plant = problem.plant.equations()?;
     let point = plant.nominal();
@@ -137,13 +140,25 @@ fn mean_linearisation(
         .iter()
         .map(|c| mean_and_spread(c).0)
         .collect();
-    let (centre, spread): (Vec<f64>, Vec<f64>) = match plant.simulate(&point, excitation, None) {
-        Ok(run) => run.states.iter().map(|c| mean_and_spread(c)).unzip(),
-        Err(_) => plant
-            .start(&point)
-            .iter()
-            .map(|&x| (x, x.abs().max(1.0)))
-            .unzip(),
+    let follows = |run: &Trajectory| {
+        run.outputs.iter().zip(outputs).all(|(simulated, y)| {
+            let error: Vec<f64> = y.iter().zip(simulated).map(|(y, s)| y - s).collect();
+            mean_and_spread(&error).1 < mean_and_spread(y).1
+        })
+    };
+    let run = plant.simulate(&point, excitation, None).ok();
+    let (centre, spread): (Vec<f64>, Vec<f64>) = match run.filter(follows) {
+        Some(run) => run.states.iter().map(|c| mean_and_spread(c)).unzip(),
+        None => {
+            let shown = shown(&plant.spec, outputs, excitation.sample_time);
+            let start = plant.start(&point);
+            let of_start = |&x: &f64| (x, if x == 0.0 { 1.0 } else { x.abs() });
+            shown
+                .into_iter()
+                .zip(&start)
+                .map(|(shown, x)| shown.unwrap_or_else(|| of_start(x)))
+                .unzip()
+        }
     };
     let linear = plant.linearise(&point, &centre, &inputs, excitation.start_time);
     let sound = linear
@@ -152,6 +167,38 @@ fn mean_linearisation(
         .chain(linear.c.iter())
         .all(|v| v.is_finite());
     sound.then_some((linear, centre, spread))
+}
+
+/// Samples over which the rate of an output is taken: over one it would be that of its noise.
+const RATE_LAG: usize = 5;
+
+/// Mean and spread of the states that outputs copy, and of those that are the rates of such states.
+fn shown(spec: &ModelSpec, outputs: &[&[f64]], sample_time: f64) -> Vec<Option<(f64, f64)>> {
+    let copies = |unknown: Unknown, of: VariableId| {
+        spec.equations.iter().any(|e| {
+            e.unknown == unknown
+                && e.coefficient.is_none()
+                && spec.expressions.node(e.rest) == Node::Variable(of)
+        })
+    };
+    let output_of = |x: VariableId| {
+        let mut all = spec.outputs().into_iter();
+        all.position(|y| copies(Unknown::Value(y), x))
+    };
+    let of_state = |x: VariableId| match output_of(x) {
+        Some(o) => Some(mean_and_spread(outputs[o])),
+        None => {
+            let mut positions = spec.states().into_iter();
+            let position = positions.find(|&p| copies(Unknown::Derivative(p), x))?;
+            let y = outputs[output_of(position)?];
+            let moved = y.iter().zip(y.iter().skip(RATE_LAG));
+            let rates: Vec<f64> = moved
+                .map(|(a, b)| (b - a) / (RATE_LAG as f64 * sample_time))
+                .collect();
+            Some(mean_and_spread(&rates))
+        }
+    };
+    spec.states().into_iter().map(of_state).collect()
 }
 
 /// Mean and standard deviation of the values that are there.
@@ -173,7 +220,8 @@ fn gains(problem: &Problem) -> Vec<DMatrix<f64>> {
         if !found.is_empty() {
             return;
         }
-        let Some((linear, centre, spread)) = mean_linearisation(problem, excitation) else {
+        let Some((linear, centre, spread)) = mean_linearisation(problem, excitation, outputs)
+        else {
             return;
         };
         let (phi, _) = linear.discrete(excitation.sample_time);
