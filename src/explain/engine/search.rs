@@ -358,6 +358,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
             let best = starts
                 .iter()
                 .filter_map(|start| inner.compare(start, COMPARED))
+                .filter(|fit| fit.form == Form::Innovation || inner.follows(fit))
                 .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
             let gain = fit.criterion - best.criterion - searched(&lead, recordings);
             let argument = lead.argument.map(|a| &arguments[a]);

@@ -7,7 +7,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::holdout::{Estimator, HeldOut, all_free, held_out};
+use super::holdout::{Estimator, HeldOut, all_free, free_run_error, held_out};
 use super::scope::Scope;
 use super::search::{Found, MOST_STEPS, Objective, chance, search};
 use crate::physics::estimate::{EstimateError, Fit, Form, PlantRecording, Study};
@@ -29,6 +29,8 @@ struct Rival {
     estimator: Estimator,
     fit: Fit,
     held_out: HeldOut,
+    /// Error of the free run over all data.
+    whole: f64,
     /// Its free run is worse than that of least squares by more than the noise allows.
     misspecified: bool,
 }
@@ -49,7 +51,8 @@ pub(crate) fn select(
         return Ok(likely);
     };
     let whole = best(&rivals, |r| r.accepted == likely.accepted);
-    let holds = whole.is_some_and(|w| w.held_out.over(&without.held_out) <= 1.0 + EQUAL);
+    let holds = whole.is_some_and(|w| w.held_out.over(&without.held_out) <= 1.0 + EQUAL)
+        && !worsens(&rivals, 0, likely.accepted);
     let adequate = chance(likely.left().0) * likely.left().1 as f64 >= CHANCE;
     let mut searches = vec![likely];
     // An unstable plant does not run freely: its likelihood has no judge.
@@ -62,7 +65,11 @@ pub(crate) fn select(
             rivals.extend(self::rivals(&found, 1, 1, recordings, hold));
             searches.push(found);
         }
-        if let Some(winner) = winner(&rivals) {
+        let improving: Vec<&Rival> = rivals
+            .iter()
+            .filter(|r| !worsens(&rivals, r.search, r.accepted))
+            .collect();
+        if let Some(winner) = winner(&improving) {
             chosen = winner;
         }
     }
@@ -114,17 +121,32 @@ fn order(a: &Rival, b: &Rival) -> std::cmp::Ordering {
     a.held_out.over(&b.held_out).total_cmp(&1.0)
 }
 
-fn best(rivals: &[Rival], which: impl Fn(&Rival) -> bool) -> Option<&Rival> {
+fn best<'a>(
+    rivals: impl IntoIterator<Item = &'a Rival>,
+    which: impl Fn(&Rival) -> bool,
+) -> Option<&'a Rival> {
     rivals
-        .iter()
+        .into_iter()
         .filter(|r| which(r))
         .min_by(|a, b| order(a, b))
 }
 
+/// Whether so many effects of a search make the free run over all data worse, by whatever estimator, although the plant without
+/// them follows: over short blocks a wrong plant is saved by its initial state.
+fn worsens(rivals: &[Rival], search: usize, accepted: usize) -> bool {
+    let least = |which: &dyn Fn(&Rival) -> bool| {
+        let errors = rivals.iter().filter(|r| which(r)).map(|r| r.whole);
+        errors.fold(f64::INFINITY, f64::min)
+    };
+    let without = least(&|r| r.accepted == 0);
+    let with = least(&|r| r.accepted == accepted && (accepted == 0 || r.search == search));
+    without < 1.0 && with > (1.0 + EQUAL) * without
+}
+
 /// The search and the number of effects whose free runs follow best; of equals the one with fewer effects.
-fn winner(rivals: &[Rival]) -> Option<(usize, usize)> {
-    let best = best(rivals, |_| true)?;
-    let equal = |r: &&Rival| r.held_out.over(&best.held_out) <= 1.0 + EQUAL;
+fn winner(rivals: &[&Rival]) -> Option<(usize, usize)> {
+    let best = best(rivals.iter().copied(), |_| true)?;
+    let equal = |r: &&&Rival| r.held_out.over(&best.held_out) <= 1.0 + EQUAL;
     let fewest = rivals.iter().filter(equal).map(|r| r.accepted).min()?;
     let chosen = rivals
         .iter()
@@ -161,12 +183,16 @@ fn rivals(
             let Some(held_out) = held_out(plant, &fit, estimator, recordings, hold) else {
                 continue;
             };
+            let options = all_free(plant, hold, estimator);
+            let study = Study::new(plant, recordings, &options).ok();
+            let whole = study.and_then(|s| free_run_error(&s, &fit, recordings));
             all.push(Rival {
                 search,
                 accepted,
                 estimator,
                 fit,
                 held_out,
+                whole: whole.unwrap_or(f64::INFINITY),
                 misspecified,
             });
         }
