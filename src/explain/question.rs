@@ -5,7 +5,7 @@ use super::answer::Answer;
 use super::check::Checked;
 use super::columns;
 use super::data::Data;
-use super::doubt::doubt;
+use super::doubt::{doubt, follows_closer};
 use super::effects::{self, Definition};
 use super::error::ExplainError;
 use super::explanation::{Explanation, Verdict};
@@ -56,13 +56,15 @@ pub fn explain(
     let checked = Checked::new(recordings, simulation, &allowed_id);
     let recordings = checked.recordings.as_slice();
     let known = know(&checked);
-    // Equations in place of columns of a simulator that is not linear. Data that were repaired are left to the search that knows
-    // how.
+    // Data that were repaired are left to the search that knows how.
+    let by_equations = || {
+        let whole = checked.troubles.is_empty();
+        whole
+            .then(|| columns::attempt(&checked, &options.without))
+            .flatten()
+    };
     let linear = known.as_ref().is_ok_and(|k| !k.relative);
-    if !linear
-        && checked.troubles.is_empty()
-        && let Some(explanation) = columns::attempt(&checked, &options.without)
-    {
+    if !linear && let Some(explanation) = by_equations() {
         return Ok(explanation);
     }
     let known = known?;
@@ -109,7 +111,12 @@ pub fn explain(
     if !linear {
         doubt(&mut explanation);
     }
-    Ok(explanation)
+    let settled =
+        !linear || explanation.remaining.adequate && explanation.verdict != Verdict::Unexplained;
+    Ok(match (!settled).then(by_equations).flatten() {
+        Some(other) if follows_closer(&other, &explanation) => other,
+        _ => explanation,
+    })
 }
 
 /// Whether the finding is an averaged equation of what is no drive, but a mass on a spring.
