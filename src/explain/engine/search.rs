@@ -306,7 +306,11 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
                 .with_most_steps(GLANCED_STEPS);
             let inner = study.of(&rough, &options).ok()?;
             let start = made.from(from, parameters, states, outputs);
-            let fitted = inner.glance(&start, GLANCE)?;
+            // What a memory does within a sample, such as a contact, frozen slopes do not see.
+            let fitted = match made.new_states {
+                0 => inner.glance(&start, GLANCE)?,
+                _ => inner.refit(&start, 0, GLANCE)?,
+            };
             Some((from.deviance - fitted.deviance, lead, i, made, fitted))
         })
         .collect();
@@ -340,7 +344,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
                 .plant
                 .clone()
                 .with_accuracy(GLANCED_ACCURACY)
-                .with_most_steps(GLANCED_STEPS);
+                .with_most_steps(MOST_STEPS);
             let inner = study.of(&rough, &options).ok()?;
             // Where an observer had to follow what was missing, a free run may do now.
             let mut starts = vec![from.clone()];
@@ -357,7 +361,10 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
             }
             let best = starts
                 .iter()
-                .filter_map(|start| inner.compare(start, COMPARED))
+                .filter_map(|start| match made.new_states {
+                    0 => inner.compare(start, COMPARED),
+                    _ => inner.refit(start, 1, THOROUGH),
+                })
                 .filter(|fit| fit.form == Form::Innovation || inner.follows(fit))
                 .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
             let gain = fit.criterion - best.criterion - searched(&lead, recordings);
