@@ -1,7 +1,4 @@
-//! What the ids of [`names`](super::names) mean: the library of plants in equations, for people.
-//!
-//! A test holds this table and the names together: every id that a place, a term and an argument can be called is described
-//! here, and none that cannot.
+//! What the ids of [`names`](super::names) mean: the library of plants in equations, for people. A test holds both together.
 
 #[cfg(test)]
 mod tests;
