@@ -148,8 +148,8 @@ impl<'p, 'a> Deviance<'p, 'a> {
         clippy::needless_range_loop,
         reason = "a direction is a column of every output"
     )]
-    /// Whitened derivatives of the predictions: a column for each free number.
-    fn jacobian(&self, runs: &Runs, slopes: Slopes) -> Option<DMatrix<f64>> {
+    /// Whitened derivatives of the predictions, a column for each free number, and whether they are approximate.
+    fn jacobian(&self, runs: &Runs, slopes: Slopes) -> Option<(DMatrix<f64>, bool)> {
         let problem = self.problem;
         let gain = self.gain(&runs.at);
         let (n, l) = (problem.states(), problem.outputs());
@@ -176,6 +176,7 @@ impl<'p, 'a> Deviance<'p, 'a> {
                 .plant
                 .frozen_slopes(&prepared, &runs.states, &directions),
         };
+        let is_frozen = frozen.is_some();
         let slopes = match frozen {
             Some(slopes) => slopes,
             None => problem.plant.slopes(&prepared, &directions)?,
@@ -200,13 +201,14 @@ impl<'p, 'a> Deviance<'p, 'a> {
             }
             row += height;
         }
-        matrix.iter().all(|v| v.is_finite()).then_some(matrix)
+        let finite = matrix.iter().all(|v| v.is_finite());
+        finite.then_some((matrix, is_frozen))
     }
 
     /// Whitened derivatives of the predictions at a point: a row for each value that counts, a column for each free number.
     pub fn derivatives(&mut self, point: &[f64]) -> Option<DMatrix<f64>> {
         let runs = self.at(point)?;
-        self.jacobian(&runs, Slopes::Exact)
+        Some(self.jacobian(&runs, Slopes::Exact)?.0)
     }
 
     /// Covariances of the free numbers.
@@ -215,7 +217,7 @@ impl<'p, 'a> Deviance<'p, 'a> {
         let nothing_known = || DMatrix::from_diagonal_element(m, m, f64::INFINITY);
         let jacobian = self
             .at(point)
-            .and_then(|runs| Some((self.jacobian(&runs, Slopes::Exact)?, runs)));
+            .and_then(|runs| Some((self.jacobian(&runs, Slopes::Exact)?.0, runs)));
         let Some((plant, runs)) = jacobian else {
             return Covariances {
                 joint: nothing_known(),
@@ -299,7 +301,11 @@ impl Objective for Deviance<'_, '_> {
 
     fn curvature(&mut self, point: &[f64]) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let runs = self.at(point)?;
-        let jacobian = self.jacobian(&runs, self.slopes)?;
+        let (jacobian, frozen) = self.jacobian(&runs, self.slopes)?;
+        if !frozen {
+            // External simulators and plants that are linear in their states have exact slopes only.
+            self.slopes = Slopes::Exact;
+        }
         let e = self.noise.whiten_kept(&runs.residual, &self.problem.mask);
         let weights: Vec<f64> = e.iter().map(|&e| self.noise.weight(e)).collect();
         let mut weighted = jacobian.clone();
