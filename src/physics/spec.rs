@@ -152,6 +152,12 @@ impl ModelSpec {
         self.ids().find(|&v| self.variable(v).name == name)
     }
 
+    /// Names of variables.
+    pub(crate) fn names(&self, variables: &[VariableId]) -> Vec<String> {
+        let names = variables.iter().map(|&v| self.variable(v).name.clone());
+        names.collect()
+    }
+
     fn ids(&self) -> impl Iterator<Item = VariableId> + use<> {
         (0..self.variables.len() as u32).map(VariableId)
     }

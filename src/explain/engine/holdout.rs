@@ -27,6 +27,8 @@ pub(crate) enum Estimator {
     Likelihood,
     /// Least squares of the free run.
     FreeRun,
+    /// Not at all: the values of the text, from initial states by least squares.
+    Given,
 }
 
 /// Errors of free runs in blocks that were left out.
@@ -135,8 +137,26 @@ pub(super) fn all_free(plant: &Plant, hold: Hold, estimator: Estimator) -> Estim
         free: vec![true; plant.spec.parameters().len()],
         hold,
         form: None,
-        least_squares: estimator == Estimator::FreeRun,
+        least_squares: estimator != Estimator::Likelihood,
     }
+}
+
+/// Options under which only initial states are free, by least squares.
+fn only_states(plant: &Plant, hold: Hold) -> EstimateOptions {
+    EstimateOptions {
+        free: vec![false; plant.spec.parameters().len()],
+        ..all_free(plant, hold, Estimator::Given)
+    }
+}
+
+/// The plant with the values of its text, and the initial states that fit the recordings best.
+pub(super) fn as_given(plant: &Plant, recordings: &[PlantRecording], hold: Hold) -> Option<Fit> {
+    let options = only_states(plant, hold);
+    let study = Study::new(plant, recordings, &options).ok()?;
+    let fit = study.least_squares(&study.nominal())?;
+    let nominal = plant.nominal().parameters;
+    let point = nominal.into_iter().chain(fit.point).collect();
+    Some(Fit { point, ..fit })
 }
 
 /// Leaves out one block after the other.
@@ -183,22 +203,19 @@ pub(super) fn held_out(
             let mut point = fit.point[..parameters].to_vec();
             point.extend(kept_start);
             let again = match estimator {
-                Estimator::FreeRun => training.least_squares_with(&point, AGAIN)?,
+                Estimator::Given => point,
+                Estimator::FreeRun => training.least_squares_with(&point, AGAIN)?.point,
                 Estimator::Likelihood => {
                     point.extend(gains);
                     let from = Fit {
                         point,
                         ..fit.clone()
                     };
-                    training.compare(&from, AGAIN)?
+                    training.compare(&from, AGAIN)?.point
                 }
             };
-            let fitted = released.with_values(&again.point[..parameters]);
-            let of_states = EstimateOptions {
-                free: vec![false; parameters],
-                least_squares: true,
-                ..options.clone()
-            };
+            let fitted = released.with_values(&again[..parameters]);
+            let of_states = only_states(&fitted, hold);
             let test = Study::new(&fitted, &left_out, &of_states).ok()?;
             let run = test.least_squares_with(&left_out_start, AGAIN)?;
             test.residual(&run)

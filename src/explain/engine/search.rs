@@ -10,7 +10,7 @@ use super::fitted::{Fitted, TIE, order, searched, with_more};
 use super::holdout::HeldOut;
 use super::hypothesis::{Ground, Trial, trials};
 use super::library::Port;
-use super::names::{SPECIFIC, family, named, rank_of};
+use super::names::{SPECIFIC, called, family, named, rank_of};
 use super::scope::Scope;
 use super::screen::{Lead, Screen, screen};
 use crate::physics::estimate::{
@@ -59,6 +59,9 @@ pub(crate) const SURE: f64 = 24.0;
 const FORETOLD: f64 = 0.25;
 /// A second effect must gain more, and at least this part of the first.
 pub(super) const SECOND: (f64, f64) = (30.0, 0.12);
+/// ... and its strength must differ from 0 by so many standard deviations with all parameters free, whatever their bounds (p =
+/// 0.001): what a parameter would do beyond its bound is no second effect.
+const DETERMINED: f64 = 3.3;
 /// Level of the test that asks for one: of all score tests together.
 pub(crate) const LEFT: f64 = 0.01;
 /// A better fit of the plant itself is taken from here on, and so often at most.
@@ -181,8 +184,9 @@ struct Stage<'a> {
     given: &'a ModelSpec,
     /// Gain that an effect needs.
     needed: f64,
-    /// Effects that were found.
+    /// Effects that were found, and the first of them.
     accepted: usize,
+    first: Option<&'a Fitted>,
     recordings: &'a [PlantRecording],
     options: &'a EstimateOptions,
     scope: &'a Scope,
@@ -212,11 +216,49 @@ fn improved(stage: &Stage, fitted: &[Fitted]) -> Option<Fit> {
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
 }
 
-/// Whether a term is a function of the same variables as another, somewhere in the plant: it may be the part of the same effect
-/// that the formula of the other leaves (math/physics.md, "Fits and decision", 8).
-fn repeats(second: &Fitted, first: &Fitted) -> bool {
-    let inside = |f: &Fitted| matches!(f.lead.term.port, Port::Equation | Port::Parameter);
-    !second.depends.is_empty() && second.depends == first.depends && inside(second) && inside(first)
+/// Whether a term may be named beside an effect. It must have a name of its own: a function without a name may be what is left of
+/// the first; and it must not be a function of the same variables inside the plant, which may be the part that the formula of
+/// the first leaves (math/physics.md, "Fits and decision", 8).
+fn differs(id: &str, port: Port, depends: &[String], (first, its_id): (&Fitted, &str)) -> bool {
+    let inside = |port: Port| matches!(port, Port::Equation | Port::Parameter);
+    let repeats = !depends.is_empty()
+        && depends == first.depends
+        && inside(port)
+        && inside(first.lead.term.port);
+    !matches!(id, "law" | "cross_coupling" | "viscous_friction")
+        && family(id) != family(its_id)
+        && !repeats
+}
+
+/// Whether the strength of a term differs from 0 by more than the parameters leave open.
+fn determined(study: &Study, found: &Fitted, options: &EstimateOptions) -> bool {
+    if !found.lead.term.free_strength {
+        return true;
+    }
+    let options = with_more(options, found.candidate.values.len());
+    let at = options.free.len() - 1;
+    study.of(&found.candidate.plant, &options).is_ok_and(|own| {
+        let variance = own.covariance(&found.fit)[(at, at)];
+        found.fit.point[at].abs() > DETERMINED * variance.sqrt()
+    })
+}
+
+/// Drops what may not be named beside an effect, but for the best term and the best curve: what these explain as well is no
+/// evidence of another.
+fn drop_alike(screen: &mut Screen, spec: &ModelSpec, first: (&Fitted, &str)) {
+    let arguments = &screen.arguments;
+    let mut taken = [false; 2];
+    let mut keep = |lead: &Lead| {
+        let variables = lead.argument.map_or(&[][..], |a| &arguments[a].variables);
+        let id = called(spec, lead.term, lead.place, variables);
+        let depends = spec.names(variables);
+        if differs(id, lead.term.port, &depends, first) {
+            return true;
+        }
+        !std::mem::replace(&mut taken[usize::from(lead.curve.is_some())], true)
+    };
+    screen.leads.retain(&mut keep);
+    screen.curves.retain(&mut keep);
 }
 
 /// Fits the leads of a plant; best first. Also the strongest test, and how many there were.
@@ -228,6 +270,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
         given,
         needed,
         accepted,
+        first,
         recordings,
         options,
         scope,
@@ -284,6 +327,9 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
             let least = FORETOLD * needed / study.information();
             screen.leads.retain(|l| l.statistic >= least);
             screen.curves.retain(|l| l.statistic >= least);
+        }
+        if let Some(first) = first {
+            drop_alike(screen, &plant.spec, (first, named(given, first)));
         }
     }
     let mut glanced: Vec<(f64, Lead, usize, Candidate, Fit)> = tried
@@ -370,12 +416,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
             let gain = fit.criterion - best.criterion - searched(&lead, recordings);
             let argument = lead.argument.map(|a| &arguments[a]);
             Some(Fitted {
-                depends: argument.map_or_else(Vec::new, |a| {
-                    a.variables
-                        .iter()
-                        .map(|&v| plant.spec.variable(v).name.clone())
-                        .collect()
-                }),
+                depends: argument.map_or_else(Vec::new, |a| plant.spec.names(&a.variables)),
                 argument: argument.map_or_else(String::new, |a| a.expression.clone()),
                 range: argument.map_or((0.0, 0.0), |a| (a.quantile(0.0), a.quantile(1.0))),
                 travel: argument.map_or(0.0, |a| a.travel(recordings[0].sample_time)),
@@ -432,7 +473,7 @@ fn without_first(
     (both - alone.gain < needed).then_some(alone)
 }
 
-/// What the equations leave out.
+/// What the equations leave out. The fit of the plant alone may be known.
 ///
 /// # Errors
 /// As those of an estimation.
@@ -442,6 +483,7 @@ pub(crate) fn search(
     hold: Hold,
     scope: &Scope,
     objective: Objective,
+    known: Option<&Fit>,
 ) -> Result<Found, EstimateError> {
     let least_squares = objective == Objective::FreeRun;
     let mut options = EstimateOptions {
@@ -451,7 +493,10 @@ pub(crate) fn search(
         least_squares,
     };
     let study = Study::new(plant, recordings, &options)?;
-    let mut baseline = study.fit(least_squares.then_some(Form::FreeRun))?;
+    let mut baseline = match known {
+        Some(fit) => fit.clone(),
+        None => study.fit(least_squares.then_some(Form::FreeRun))?,
+    };
     let mut steps: Vec<Vec<Fitted>> = Vec::new();
     let mut now = plant.clone();
     let mut fit = baseline.clone();
@@ -484,6 +529,7 @@ pub(crate) fn search(
                 given: &plant.spec,
                 needed,
                 accepted: accepted_so_far,
+                first: steps.first().and_then(|s| s.first()),
                 recordings,
                 options: &options,
                 scope,
@@ -495,6 +541,9 @@ pub(crate) fn search(
             let Some(better) = again.flatten() else {
                 break found;
             };
+            let lost = fit.criterion - better.criterion;
+            let (mut fitted, strongest) = found;
+            let most = fitted.iter().map(|f| f.gain).fold(0.0, f64::max);
             match steps.last_mut().and_then(|s| s.first_mut()) {
                 None => baseline = better.clone(),
                 Some(last) => {
@@ -503,6 +552,11 @@ pub(crate) fn search(
                 }
             }
             fit = better;
+            // All gains are less by the same amount; where that is little of the best, candidates need not be fitted again.
+            if lost < TIE.1 * most {
+                fitted.iter_mut().for_each(|f| f.gain -= lost);
+                break (fitted, strongest);
+            }
         };
         for &i in &open {
             let trial = fitted.iter().find(|f| f.hypothesis == Some(i));
@@ -512,16 +566,14 @@ pub(crate) fn search(
             }
         }
         tests.push(strongest);
-        // What comes second must have a name of its own, and not that of the first: a function without a name may be what is
-        // left of the first.
         let first = steps.first().and_then(|s| s.first());
         let new = |f: &&Fitted| {
             first.is_none_or(|first| {
                 let id = named(&now.spec, f);
+                let first = (first, named(&plant.spec, first));
                 f.hypothesis.is_some()
-                    || !matches!(id, "law" | "cross_coupling" | "viscous_friction")
-                        && family(id) != family(named(&plant.spec, first))
-                        && !repeats(f, first)
+                    || differs(id, f.lead.term.port, &f.depends, first)
+                        && determined(&study, f, &options)
             })
         };
         let best = fitted.first().filter(new);

@@ -7,9 +7,9 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::holdout::{Estimator, HeldOut, all_free, free_run_error, held_out};
+use super::holdout::{Estimator, HeldOut, all_free, as_given, free_run_error, held_out};
 use super::scope::Scope;
-use super::search::{Found, MOST_STEPS, Objective, chance, search};
+use super::search::{Found, MOST_STEPS, Objective, SECOND, chance, search};
 use crate::physics::estimate::{EstimateError, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, Plant};
 
@@ -45,7 +45,7 @@ pub(crate) fn select(
     hold: Hold,
     scope: &Scope,
 ) -> Result<Found, EstimateError> {
-    let likely = search(plant, recordings, hold, scope, Objective::Likelihood)?;
+    let likely = search(plant, recordings, hold, scope, Objective::Likelihood, None)?;
     let mut rivals = rivals(&likely, 0, 0, recordings, hold);
     let Some(without) = best(&rivals, |r| r.accepted == 0) else {
         return Ok(likely);
@@ -53,15 +53,25 @@ pub(crate) fn select(
     let whole = best(&rivals, |r| r.accepted == likely.accepted);
     let holds = whole.is_some_and(|w| w.held_out.over(&without.held_out) <= 1.0 + EQUAL)
         && !worsens(&rivals, 0, likely.accepted);
-    let adequate = chance(likely.left().0) * likely.left().1 as f64 >= CHANCE;
+    let (strongest, tests) = likely.left();
+    let adequate = chance(strongest) * tests as f64 >= CHANCE;
+    // What is left would not make a second effect: it does not put the first in doubt either.
+    let found = likely.steps[0].first().filter(|_| likely.accepted > 0);
+    let little_left = found.is_some_and(|first| strongest < SECOND.1 * first.gain);
     let mut searches = vec![likely];
     // An unstable plant does not run freely: its likelihood has no judge.
     let judged = rivals.iter().any(|r| r.held_out.follows());
     let mut chosen = (0, searches[0].accepted);
     // With an observer the residuals are white wherever the observer follows: that proves no effect.
-    let proved = adequate && (searches[0].accepted == 0 || searches[0].fit.form == Form::FreeRun);
+    let proved = (adequate || little_left)
+        && (searches[0].accepted == 0 || searches[0].fit.form == Form::FreeRun);
     if judged && !(holds && proved) {
-        if let Ok(found) = search(plant, recordings, hold, scope, Objective::FreeRun) {
+        let known = rivals
+            .iter()
+            .find(|r| r.accepted == 0 && r.estimator == Estimator::FreeRun)
+            .map(|r| r.fit.clone());
+        let free_run = Objective::FreeRun;
+        if let Ok(found) = search(plant, recordings, hold, scope, free_run, known.as_ref()) {
             rivals.extend(self::rivals(&found, 1, 1, recordings, hold));
             searches.push(found);
         }
@@ -85,7 +95,7 @@ pub(crate) fn select(
         found.baseline = without.fit.clone();
     }
     if let Some(with) = last {
-        found.options.least_squares = with.estimator == Estimator::FreeRun;
+        found.options.least_squares = with.estimator != Estimator::Likelihood;
         found.fit = with.fit.clone();
         found.information = information(&found, recordings).unwrap_or(1.0);
         if judged && let Some(without) = baseline {
@@ -96,14 +106,20 @@ pub(crate) fn select(
 }
 
 /// Of the fits of one plant the likelihood's, whose standard deviations hold, unless it simulates worse, in blocks left out or
-/// by more than its noise allows.
+/// by more than its noise allows. Least squares stands for it, unless the values of the text simulate better in blocks left out.
 fn trusted<'a>(rivals: &[&'a Rival], judged: bool) -> Option<&'a Rival> {
     let least = *rivals.iter().min_by(|a, b| order(a, b))?;
     let likelihood = |r: &&&Rival| {
         r.estimator == Estimator::Likelihood
             && (!judged || r.held_out.over(&least.held_out) <= 1.0 + EQUAL && !r.misspecified)
     };
-    let free_run = || rivals.iter().find(|r| r.estimator == Estimator::FreeRun);
+    let free_run = || {
+        let follows = |r: &&&Rival| {
+            r.estimator == Estimator::FreeRun
+                && (!judged || r.held_out.over(&least.held_out) <= 1.0 + EQUAL)
+        };
+        rivals.iter().find(follows)
+    };
     let chosen = rivals.iter().find(likelihood).or_else(free_run);
     Some(chosen.copied().unwrap_or(least))
 }
@@ -156,7 +172,7 @@ fn winner(rivals: &[&Rival]) -> Option<(usize, usize)> {
     Some((chosen.search, chosen.accepted))
 }
 
-/// Every number of effects of a search from `fewest`, by both estimators.
+/// Every number of effects of a search from `fewest`, by both estimators, and the plant as it was given.
 fn rivals(
     found: &Found,
     search: usize,
@@ -178,6 +194,11 @@ fn rivals(
         {
             fits[0].2 = misspecified;
             fits.push((Estimator::FreeRun, least_squares, false));
+        }
+        if accepted == 0
+            && let Some(given) = as_given(plant, recordings, hold)
+        {
+            fits.push((Estimator::Given, given, false));
         }
         for (estimator, fit, misspecified) in fits {
             let Some(held_out) = held_out(plant, &fit, estimator, recordings, hold) else {

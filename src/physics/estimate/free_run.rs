@@ -94,8 +94,9 @@ pub(super) fn follows(problem: &Problem, residual: &Series) -> bool {
     })
 }
 
-/// The fit in free run from the values of the text and, unless that leaves white noise that does not depend on the inputs, from
-/// the values of the text less one term each, and from draws within the bounds. Summits are compared under white noise: a
+/// The fit in free run from the values of the text and, unless that leaves white noise that does not depend on the inputs, to
+/// longer and longer parts of the recordings; unless both end at one summit, also from the values of the text less one term
+/// each, and from draws within the bounds. Summits are compared under white noise: a
 /// coloured noise model would absorb what a wrong one leaves.
 pub(super) fn fit_free_run(problem: &Problem) -> Option<Fit> {
     let mut point = problem.nominal();
@@ -110,12 +111,17 @@ pub(super) fn fit_free_run(problem: &Problem) -> Option<Fit> {
     }
     if !problem.plant.costly()
         && let Some((deviance, point)) = grown_fit(problem)
-        && deviance < highest - SAME_SUMMIT
     {
-        highest = deviance;
-        best = coloured_fit(problem, point, f64::INFINITY).or(best);
-        if best.as_ref().is_some_and(|fit| leaves_noise(problem, fit)) {
+        // Two ways that end at one summit: there is no sign of others, and what is left is not a matter of the start.
+        if (deviance - highest).abs() < SAME_SUMMIT {
             return best;
+        }
+        if deviance < highest {
+            highest = deviance;
+            best = coloured_fit(problem, point, f64::INFINITY).or(best);
+            if best.as_ref().is_some_and(|fit| leaves_noise(problem, fit)) {
+                return best;
+            }
         }
     }
     // Draws are compared on the first part of the recordings.

@@ -73,6 +73,11 @@ impl<'a> Study<'a> {
         self.information * fit.deviance + numbers as f64 * values.ln()
     }
 
+    /// The free numbers as the text has them.
+    pub fn nominal(&self) -> Vec<f64> {
+        self.problem.nominal()
+    }
+
     /// The likelier form of free run and observer, as [`estimate`](super::estimate) finds it.
     pub fn fit(&self, form: Option<Form>) -> Result<Fit, EstimateError> {
         Ok(best_fit(&self.problem, form)?.0)
