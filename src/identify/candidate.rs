@@ -5,11 +5,16 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::error::IdentifyError;
 use super::method::{Decomposed, Estimated, Windows};
+use super::options::{Options, Polish};
 use super::polish::{Effort, Polished, polish, reduced};
 use super::source::Source;
 use super::stable::with_stable_predictor;
-use super::truncation::{state_covariance, truncation};
+use super::truncation::{LARGEST_FOR_POLISH, state_covariance, truncation};
 use crate::model::StateSpace;
+
+/// The polish is also used when it gains this many times more (in chi-square) than the truncation can distort:
+/// then the estimate that it starts from is the poorer one by far.
+const GAIN_OVER_TRUNCATION: f64 = 10.0;
 
 /// A model of one order with what was learnt about it.
 #[derive(Debug, Clone)]
@@ -120,6 +125,21 @@ impl Window {
             predictor,
             state_covariance,
             truncation,
+        }
+    }
+}
+
+/// Whether the final numbers are those of the polish.
+pub(super) fn polish_is_used(options: &Options, candidate: &Candidate) -> bool {
+    match options.polish {
+        Polish::Never => false,
+        Polish::Always => true,
+        Polish::Auto => {
+            options.polishes_by_default()
+                && candidate.polished.as_ref().is_some_and(|p| {
+                    candidate.truncation <= LARGEST_FOR_POLISH
+                        || p.start_cost - p.cost > GAIN_OVER_TRUNCATION * candidate.truncation
+                })
         }
     }
 }

@@ -3,10 +3,11 @@
 use nalgebra::DMatrix;
 
 use super::algorithms::Method;
-use super::candidate::{Candidate, cost_p_value};
+use super::candidate::{cost_p_value, polish_is_used};
 use super::data::Data;
 use super::dead_time::Evidence;
 use super::error::IdentifyError;
+use super::free_run::FreeRunRest;
 use super::method::Estimated;
 use super::options::{CovarianceKind, Options, Order, Polish};
 use super::order::OrderEvidence;
@@ -17,9 +18,8 @@ use super::select::{Selection, Windowed};
 use super::source::Source;
 use super::stable::{largest_stable_radius, with_poles_inside, with_stable_predictor};
 use super::summary::{
-    Asked, Diagnostics, FreeRunRest, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
+    Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
 };
-use super::truncation::LARGEST_FOR_POLISH;
 use super::varx::{Varx, varx};
 use super::warnings;
 use crate::covariance::{
@@ -31,10 +31,6 @@ use crate::moments::Trend;
 
 /// Singular values that are reported.
 const SINGULAR_VALUES_KEPT: usize = 40;
-
-/// The polish is also used when it gains this many times more (in chi-square) than the truncation can distort:
-/// then the estimate that it starts from is the poorer one by far.
-const GAIN_OVER_TRUNCATION: f64 = 10.0;
 
 /// A fitted model in the user's units.
 #[derive(Debug)]
@@ -73,21 +69,6 @@ pub(super) struct Chosen {
     pub free_run_rest: Vec<FreeRunRest>,
     /// How it was decided.
     pub explanation: Vec<String>,
-}
-
-/// Whether the final numbers are those of the polish.
-pub(super) fn polish_is_used(options: &Options, candidate: &Candidate) -> bool {
-    match options.polish {
-        Polish::Never => false,
-        Polish::Always => true,
-        Polish::Auto => {
-            options.polishes_by_default()
-                && candidate.polished.as_ref().is_some_and(|p| {
-                    candidate.truncation <= LARGEST_FOR_POLISH
-                        || p.start_cost - p.cost > GAIN_OVER_TRUNCATION * candidate.truncation
-                })
-        }
-    }
 }
 
 /// Makes the model out of what was chosen.

@@ -14,10 +14,10 @@
 //!   (Breiman et al. 1984, *Classification and Regression Trees*, section 3.4.3). Only stable models take part.
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
-use super::candidate::Candidate;
+use super::candidate::{Candidate, polish_is_used};
 use super::error::IdentifyError;
-use super::finish::polish_is_used;
 use super::horizon;
 use super::options::{Options, Order};
 use super::order;
@@ -26,7 +26,6 @@ use super::polish::{Effort, polish, stabilised};
 use super::select::{Selection, Windowed, select, windowed};
 use super::source::Source;
 use super::stable::largest_stable_radius;
-use super::summary::FreeRunRest;
 use super::varx::varx;
 use crate::linalg::spectral_radius;
 use crate::model::{StateSpace, estimate_initial_state};
@@ -51,6 +50,18 @@ const SHORTEST_BLOCK: usize = 2;
 const LONGEST_RUN: usize = 200_000;
 /// Models whose error over all the data is this many times the smallest one (mean squares) are not looked at again.
 const HOPELESS: f64 = 4.0;
+
+/// What a linear model cannot hold of an output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct FreeRunRest {
+    /// Name of the output.
+    pub output: String,
+    /// Root mean square error of the free run on blocks held out, as a share of that of the output.
+    pub share: f64,
+    /// From where to where nine tenths of its power lie, in hertz.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub band_hz: Option<[f64; 2]>,
+}
 
 /// What the free runs lead to.
 pub(super) struct FreeRun {

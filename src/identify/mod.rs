@@ -76,6 +76,7 @@ pub use delay::{AlignedColumns, Aligner};
 pub use error::IdentifyError;
 pub use finish::Fit;
 pub use fit::fit;
+pub use free_run::FreeRunRest;
 pub(crate) use model::channel_names;
 pub use model::{IdentifiedChannel, Model, identify, identify_records};
 pub use nested::{
@@ -89,9 +90,7 @@ pub use records::{FileRecords, MemoryRecords, ReadProgress, Recording, Records, 
 pub use reduced::{ReducedRecords, SAMPLES_KEPT};
 pub use resolution::CoarseChannel;
 pub use source::Source;
-pub use summary::{
-    Asked, Diagnostics, FreeRunRest, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
-};
+pub use summary::{Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary};
 pub use variance::Propagation;
 pub use varx::{Varx, varx};
 pub use warnings::of_closed_loop as warnings_of_closed_loop;

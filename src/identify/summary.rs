@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::algorithms::{Method, Stochastic};
+use super::free_run::FreeRunRest;
 use super::options::{CovarianceKind, Polish};
 use super::order::OrderEvidence;
 use super::pbsid_opt::Weight;
@@ -28,18 +29,6 @@ pub struct OrderTest {
     /// Probability of so large a cost when order and window are right.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p_value: Option<f64>,
-}
-
-/// What a linear model cannot hold of an output.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct FreeRunRest {
-    /// Name of the output.
-    pub output: String,
-    /// Root mean square error of the free run on blocks held out, as a share of that of the output.
-    pub share: f64,
-    /// From where to where nine tenths of its power lie, in hertz.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub band_hz: Option<[f64; 2]>,
 }
 
 /// What stability cost.

@@ -70,6 +70,7 @@ mod record;
 mod repair;
 mod resample;
 mod roles;
+mod sample_time;
 mod sampling;
 mod source;
 mod stamp;
@@ -91,7 +92,7 @@ pub use reader::{
 pub use reading::Reading;
 pub use record::{LARGEST_SIZE, Log};
 pub use roles::{Missing, RoleNeed, Roles, TimeUnit};
-pub use sampling::is_sample_time;
+pub use sample_time::is_sample_time;
 pub use source::Source;
 pub use stamps::Origin;
 pub use table::{TableRoles, time_base_of};

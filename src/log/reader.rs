@@ -7,8 +7,8 @@ use super::error::LogError;
 use super::header::Header;
 use super::lines::Lines;
 use super::parse::RowParser;
-use super::roles::{RoleNeed, Roles, TimeUnit, assign};
-use super::sampling::Sampling;
+use super::roles::{RoleNeed, Roles, assign};
+use super::sampling::{Sampling, time_base};
 use super::source::{Source, Stream};
 use super::stamps::first_look;
 
@@ -291,39 +291,6 @@ impl LogReader {
             sample_time,
             start_time,
         })
-    }
-}
-
-pub(super) fn time_base(
-    header: &Header,
-    index: usize,
-    first_line: u64,
-    asked: Option<TimeUnit>,
-) -> Result<Sampling, LogError> {
-    let scale = time_unit(header, index, asked)?.seconds();
-    Ok(Sampling::new(header, index, scale, first_line))
-}
-
-/// Unit of the time column: as asked for, by its header, by the end of its name, or seconds.
-pub(super) fn time_unit(
-    header: &Header,
-    index: usize,
-    asked: Option<TimeUnit>,
-) -> Result<TimeUnit, LogError> {
-    let channel = header.channels.get(index);
-    let unit = channel.and_then(|channel| channel.unit.as_deref());
-    if let Some(asked) = asked {
-        return Ok(asked);
-    }
-    match unit {
-        Some(unit) => TimeUnit::parse(unit).ok_or_else(|| LogError::TimeUnit {
-            name: header.name.clone(),
-            column: header.column(index),
-            unit: unit.to_owned(),
-        }),
-        None => Ok(channel
-            .and_then(|channel| TimeUnit::of_name(&channel.name))
-            .unwrap_or(TimeUnit::Seconds)),
     }
 }
 

@@ -122,7 +122,7 @@ impl Reading {
     ) -> Result<Self, LogError> {
         if let Some(sample_time) = roles
             .resample
-            .filter(|step| !super::sampling::is_sample_time(*step))
+            .filter(|step| !super::sample_time::is_sample_time(*step))
         {
             return Err(LogError::InvalidSampleTime { sample_time });
         }

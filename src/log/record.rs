@@ -8,7 +8,7 @@ use super::error::LogError;
 use super::reader::{Block, LogReader, check_same_channels, check_same_sampling};
 use super::reading::Reading;
 use super::roles::{RoleNeed, Roles};
-use super::sampling::is_sample_time;
+use super::sample_time::is_sample_time;
 use super::source::Source;
 use super::writer::write_table;
 use crate::limits;

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::channel::Channel;
 use super::error::LogError;
 use super::header::Header;
-use super::sampling::is_sample_time;
+use super::sample_time::is_sample_time;
 
 /// What the user asked for: `--inputs`, `--outputs`, `--time`, `--dt`. The default leaves all to the headers.
 ///

@@ -5,15 +5,8 @@
 
 use super::error::LogError;
 use super::header::Header;
-
-/// Shortest and longest sample time, in seconds: from the fastest that light can be gated to longer than there has been
-/// time. Beyond, frequencies and times of what was sampled leave the range of numbers.
-const SAMPLE_TIMES: std::ops::RangeInclusive<f64> = 1e-18..=1e18;
-
-/// Whether this can be a sample time, in seconds.
-pub fn is_sample_time(seconds: f64) -> bool {
-    SAMPLE_TIMES.contains(&seconds)
-}
+use super::roles::TimeUnit;
+use super::sample_time::is_sample_time;
 
 /// How far one step may be off, relative to the sample time.
 pub(super) const STEP_TOLERANCE: f64 = 0.01;
@@ -307,4 +300,38 @@ pub(super) fn shortest_within(value: f64, tolerance: f64) -> f64 {
 /// A value as a message shows it, to nine digits.
 pub(super) fn readable(value: f64) -> f64 {
     shortest_within(value, 1e-9 * value.abs())
+}
+
+/// Sampling as the time column `index` tells it, in the unit of that column.
+pub(super) fn time_base(
+    header: &Header,
+    index: usize,
+    first_line: u64,
+    asked: Option<TimeUnit>,
+) -> Result<Sampling, LogError> {
+    let scale = time_unit(header, index, asked)?.seconds();
+    Ok(Sampling::new(header, index, scale, first_line))
+}
+
+/// Unit of the time column: as asked for, by its header, by the end of its name, or seconds.
+pub(super) fn time_unit(
+    header: &Header,
+    index: usize,
+    asked: Option<TimeUnit>,
+) -> Result<TimeUnit, LogError> {
+    let channel = header.channels.get(index);
+    let unit = channel.and_then(|channel| channel.unit.as_deref());
+    if let Some(asked) = asked {
+        return Ok(asked);
+    }
+    match unit {
+        Some(unit) => TimeUnit::parse(unit).ok_or_else(|| LogError::TimeUnit {
+            name: header.name.clone(),
+            column: header.column(index),
+            unit: unit.to_owned(),
+        }),
+        None => Ok(channel
+            .and_then(|channel| TimeUnit::of_name(&channel.name))
+            .unwrap_or(TimeUnit::Seconds)),
+    }
 }

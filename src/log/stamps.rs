@@ -4,8 +4,8 @@ use super::cells::{Mark, is_missing};
 use super::decimal;
 use super::error::LogError;
 use super::header::Header;
-use super::reader::time_unit;
 use super::roles::{Roles, TimeUnit};
+use super::sampling::time_unit;
 use super::stamp::{DAY, Format, iso};
 
 /// Seconds since 1970 of times that are taken for dates: 1979 to 2200. What a clock shows that counts from when it was

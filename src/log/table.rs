@@ -3,8 +3,8 @@
 use super::channel::Channel;
 use super::error::LogError;
 use super::header::Header;
-use super::reader::time_base;
 use super::roles::{RoleNeed, Roles, assign};
+use super::sampling::time_base;
 
 /// Columns of a table by role, found by the same rules as those of a file. Indices count from 0.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use flate2::write::GzEncoder;
 use super::atomic::AtomicFile;
 use super::channel::Channel;
 use super::error::LogError;
-use super::sampling::is_sample_time;
+use super::sample_time::is_sample_time;
 
 enum Encoder {
     Plain(AtomicFile),
