@@ -3,17 +3,15 @@
 
 use std::io::{Cursor, Read};
 
-use super::clock::{self, Piece, Rows, counted};
-use super::error::LogError;
-use super::fill::{Filled, SHORTEST, Tally, fill};
-use super::reader::LogReader;
+use super::log_error::LogError;
+use super::read::{LogReader, Whole, whole};
 use super::record::Log;
-use super::resample::Resampling;
 use super::roles::{Missing, RoleNeed, Roles};
-use super::sampling::readable;
-use super::source::{Source, Stream};
-use super::stamps::{Origin, check_sample_time};
-use super::whole::{self, Whole};
+use super::text::{Source, Stream};
+use super::time::{
+    Filled, Origin, Piece, Resampling, Rows, SHORTEST, Tally, check_sample_time, counted, fill,
+    readable, time_grid,
+};
 use crate::limits;
 
 /// What of a file is held in memory at once, in its size: bytes, text, rows and columns.
@@ -216,7 +214,7 @@ impl Assembly<'_> {
                     rounding: stamps.rounding,
                     same: &same,
                 };
-                let grid = clock::lay(&rows, self.roles.missing, self.roles.resample)?;
+                let grid = time_grid::lay(&rows, self.roles.missing, self.roles.resample)?;
                 said.extend(grid.said);
                 (grid.pieces, grid.step)
             }
@@ -477,7 +475,7 @@ fn phase(piece: &Piece, step: f64) -> f64 {
         .zip(&piece.times)
         .map(|(k, t)| t - first - *k as f64 * step);
     let mean = off.sum::<f64>() / piece.times.len().max(1) as f64;
-    if mean.abs() > super::sampling::STEP_TOLERANCE * step {
+    if mean.abs() > super::time::STEP_TOLERANCE * step {
         readable(first + mean)
     } else {
         first

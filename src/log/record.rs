@@ -3,14 +3,13 @@
 use std::io::Read;
 use std::path::Path;
 
-use super::channel::Channel;
-use super::error::LogError;
-use super::reader::{Block, LogReader, check_same_channels, check_same_sampling};
+use super::log_error::LogError;
+use super::read::{Block, LogReader, check_same_channels, check_same_sampling};
 use super::reading::Reading;
 use super::roles::{RoleNeed, Roles};
 use super::sample_time::is_sample_time;
-use super::source::Source;
-use super::writer::write_table;
+use super::text::{Channel, Source};
+use super::write::write_table;
 use crate::limits;
 
 /// A recording: a uniform time base, named inputs u and named outputs y; a column a channel, N samples each.
