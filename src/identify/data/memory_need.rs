@@ -9,7 +9,7 @@
 //! - the derivative of the predictor with respect to the parameters is `l p q x P`, and the regression on it holds
 //!   [`DERIVATIVES`] of that size, with one `l p q x n^2` beside them;
 //! - the residual tests, which come after the fit, average the sensitivity of the residuals to the parameters
-//!   (`validate::sensitivity`, within `covariance::residual_budget`).
+//!   (`validate::parameter_errors`, within `covariance::residual_budget`).
 //!
 //! The counts are measured ones; `tests/limits.rs` holds the sum against peaks.
 

@@ -6,6 +6,7 @@
 //! | `algorithm` | the algorithms; one run of one of them; its true asymptotic variance |
 //! | `variance` | estimated variances of many runs against the true one |
 //! | `chiuso_picci_statements` | what the paper says, held against that |
+//! | `variance_study` | what both examples share |
 //! | `first_order_example`, `fifth_order_example` | the examples |
 
 mod algorithm;
@@ -13,6 +14,7 @@ mod chiuso_picci_statements;
 mod fifth_order_example;
 mod first_order_example;
 mod variance;
+mod variance_study;
 
 pub use fifth_order_example::ChiusoPicciTwo;
 pub use first_order_example::ChiusoPicciOne;
