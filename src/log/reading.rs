@@ -30,6 +30,36 @@ pub struct Reading {
     pub said: Option<String>,
 }
 
+impl Log {
+    /// Reads a recording with at least one input and one output; [`Reading`] has what was recognised and repaired.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the file: see [`LogError`]; also that it is in several parts.
+    pub fn read(source: &Source, roles: &Roles) -> Result<Self, LogError> {
+        Self::read_with(source, roles, RoleNeed::Identify)
+    }
+
+    /// As [`Log::read`], with other roles needed.
+    ///
+    /// # Errors
+    /// As [`Log::read`].
+    pub fn read_with(source: &Source, roles: &Roles, need: RoleNeed) -> Result<Self, LogError> {
+        Reading::read(source, roles, need)?.whole()
+    }
+
+    /// As [`Log::read`], of bytes in memory; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As [`Log::read`].
+    pub fn from_reader(
+        name: &str,
+        reader: impl Read + Send + 'static,
+        roles: &Roles,
+    ) -> Result<Self, LogError> {
+        Reading::from_reader(name, reader, roles, RoleNeed::Identify)?.whole()
+    }
+}
+
 impl Reading {
     /// Reads a file, or standard input.
     ///

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::sampling::{STEP_TOLERANCE, readable};
-use super::time_grid::{CONFLICTS, Rows, counted, typical_step};
+use super::stamped_rows::{CONFLICTS, Rows, counted, typical_step};
 use crate::log::log_error::LogError;
 use crate::log::roles::Missing;
 

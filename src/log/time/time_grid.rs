@@ -5,11 +5,10 @@
 
 use super::repair::{repair, spread_coarse};
 use super::sampling::{GAP, STEP_TOLERANCE, check_drift, readable, shortest_within};
+use super::stamped_rows::{CONFLICTS, Rows, counted, typical_step};
 use crate::log::log_error::LogError;
 use crate::log::roles::Missing;
 
-/// Share of rows whose stamp may be in conflict with the others.
-pub(super) const CONFLICTS: f64 = 0.01;
 /// Samples missing in a row that are interpolated; more are a gap. Two points of a straight line between neighbours
 /// say little that the neighbours do not.
 pub(super) const BRIDGED: usize = 2;
@@ -40,21 +39,6 @@ pub(crate) struct Grid {
     /// Sample time in seconds.
     pub(crate) step: f64,
     pub(crate) said: Vec<String>,
-}
-
-/// What is known of the rows.
-pub(crate) struct Rows<'a> {
-    pub(crate) name: &'a str,
-    /// Header of the time column.
-    pub(crate) column: &'a str,
-    /// Stamps in seconds since the first, NaN where there is none.
-    pub(crate) stamps: &'a [f64],
-    /// Line of each row.
-    pub(crate) lines: &'a [u64],
-    /// Rounding of a stamp in seconds, as far as its number has any.
-    pub(crate) rounding: f64,
-    /// Whether a row says the same as the one before it in every column.
-    pub(crate) same: &'a dyn Fn(usize) -> bool,
 }
 
 /// Places the rows on a grid; with `resample`, only orders them and cuts them at gaps.
@@ -166,57 +150,6 @@ pub(crate) fn lay(
         ));
     }
     Ok(Grid { pieces, step, said })
-}
-
-impl Rows<'_> {
-    pub(crate) fn line(&self, row: usize) -> u64 {
-        self.lines.get(row).copied().unwrap_or(0)
-    }
-
-    fn too_short(&self, samples: usize) -> LogError {
-        LogError::TooShort {
-            name: self.name.to_owned(),
-            samples,
-            needed: 2,
-            purpose: "telling the sample time from the time column".to_owned(),
-            hint: ", or pass `--dt S`",
-        }
-    }
-
-    pub(super) fn not_increasing(&self, before: f64, row: usize, after: f64) -> LogError {
-        LogError::TimeNotIncreasing {
-            name: self.name.to_owned(),
-            line: self.line(row),
-            column: self.column.to_owned(),
-            before: readable(before),
-            after: readable(after),
-        }
-    }
-}
-
-/// "1 row", "2 rows".
-pub(crate) fn counted(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
-}
-
-/// The mean of the steps within half of their median.
-pub(super) fn typical_step(rows: &[(usize, f64)]) -> Option<f64> {
-    let mut steps: Vec<f64> = rows
-        .windows(2)
-        .map(|w| w[1].1 - w[0].1)
-        .filter(|step| *step > 0.0)
-        .collect();
-    if steps.is_empty() {
-        return None;
-    }
-    let middle = steps.len() / 2;
-    let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    let median = *median;
-    let near: Vec<f64> = steps
-        .into_iter()
-        .filter(|s| (s / median - 1.0).abs() < 0.5)
-        .collect();
-    Some(near.iter().sum::<f64>() / near.len() as f64)
 }
 
 type Run = Vec<(usize, f64)>;

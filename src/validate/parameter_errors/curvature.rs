@@ -10,7 +10,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::residual_sensitivity::{Averages, Regressor};
+use super::averages::{Averages, Regressor};
 use crate::covariance::ParameterLayout;
 use crate::linalg::{multiply, spectral_radius};
 use crate::model::{Predictor, StateSpace};

@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use super::averages::{Averages, Regressor};
 use super::curvature::Curvature;
 use super::filters::{Filters, Segment};
 use crate::covariance::{ParameterCovariance, samples_followed};
@@ -19,9 +20,6 @@ const SHORTEST_BATCH: usize = 64;
 /// Parameter directions below this share of the largest variance, parameters scaled to unit variance, are
 /// directions of the state basis.
 const GAUGE: f64 = 1e-9;
-
-/// A regressor: channel (inputs, then residuals) and lag.
-pub(crate) type Regressor = (usize, usize);
 
 /// Sensitivities along directions of the parameter space, with the samples they belong to.
 #[derive(Debug)]
@@ -42,21 +40,6 @@ pub(crate) struct Sensitivity {
     curvature: Option<Curvature>,
     /// Mean of `psi Cov(theta) psi'` for each output: residual variance that parameter errors add.
     pub(crate) excess: Vec<f64>,
-}
-
-/// Averages of tested regressors times sensitivities, both whitened.
-#[derive(Debug, Clone)]
-pub(crate) struct Averages {
-    /// `E[w_white (x) t_white-sensitivity]`, `dimension x m`.
-    pub(super) cross: DMatrix<f64>,
-    /// Mean square error of one entry of `cross Cov^(1/2)`, from the scatter of batches.
-    pub(crate) error: f64,
-    /// `E[psi' Lambda^-1 psi]`, `m x m`.
-    pub(crate) information: DMatrix<f64>,
-    /// Mean square of what the first order misses in one whitened score.
-    pub(super) remainder: f64,
-    /// Samples averaged over.
-    pub(crate) samples: usize,
 }
 
 impl Sensitivity {

@@ -17,7 +17,8 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::residual_sensitivity::{Averages, Sensitivity};
+use super::averages::Averages;
+use super::residual_sensitivity::Sensitivity;
 use crate::linalg::{multiply, multiply_nt, multiply_tn, svd_thin, symmetric_eigen};
 use crate::validate::residuals::Partial;
 use crate::validate::validate_error::ValidateError;

@@ -1,5 +1,6 @@
 //! Tables of a linear model: summary, orders, poles and gains, validation, verdict.
 
+mod fit_text;
 mod model_text;
 mod orders;
 mod roots;
@@ -7,8 +8,9 @@ mod show_text;
 mod validation_text;
 mod verdict_text;
 
+pub(crate) use fit_text::{fit_measures, fit_table};
+pub(crate) use model_text::method;
 pub use model_text::{ModelText, model_text};
-pub(crate) use model_text::{fit_measures, fit_table, method};
 pub use orders::comparison;
 pub(crate) use orders::order_table;
 pub(crate) use roots::{continuous_pole_table, gain_table, pole_table, shortened};

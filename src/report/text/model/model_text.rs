@@ -2,16 +2,15 @@
 
 use std::fmt;
 
+use super::fit_text::fit;
 use super::orders::order_evidence;
-use super::roots::{poles, shortened, static_gains};
+use super::roots::{poles, static_gains};
 use super::validation_text::{findings, linearity_tested};
 use super::verdict_text::verdict;
 use crate::covariance::{Invariants, invariants};
 use crate::identify::{CovarianceKind, Model, Summary, channel_names};
-use crate::report::text::number::{percent, significant};
-use crate::report::text::table::Table;
 use crate::report::text::{Style, comparison, wrapped};
-use crate::validate::{FitMeasure, Validation};
+use crate::validate::Validation;
 
 /// Poles and gains that a summary lists.
 const LINES_SHOWN: usize = 12;
@@ -99,42 +98,6 @@ pub(super) fn dynamics(model: &Model, described: &Invariants, most: usize, style
         style,
     ));
     out
-}
-
-/// Fit of each output.
-pub(crate) fn fit(tests: &Validation) -> String {
-    let mut out = format!("\nFit\n{}", fit_table(tests).lines());
-    if let Some(reason) = &tests.free_run_unavailable {
-        out.push_str(&wrapped("  no free run: ", reason));
-    }
-    out
-}
-
-/// The same as a table.
-pub(crate) fn fit_table(tests: &Validation) -> Table {
-    fit_measures(&tests.one_step, tests.free_run.as_ref())
-}
-
-/// Fits one step ahead and in free run.
-pub(crate) fn fit_measures(one_step: &FitMeasure, free_run: Option<&FitMeasure>) -> Table {
-    let mut table = Table::new([
-        "output",
-        "one step ahead",
-        "rms error",
-        "free run",
-        "rms error",
-    ]);
-    for (index, one) in one_step.outputs.iter().enumerate() {
-        let free = free_run.and_then(|f| f.outputs.get(index));
-        table.row([
-            shortened(&one.output),
-            percent(one.fit_percent),
-            significant(one.rms_error, 4),
-            free.map_or("-".to_owned(), |f| percent(f.fit_percent)),
-            free.map_or("-".to_owned(), |f| significant(f.rms_error, 4)),
-        ]);
-    }
-    table
 }
 
 /// How the numbers came about.

@@ -1,6 +1,6 @@
 //! The judgement of a model on a recording.
 
-use super::model_text::fit;
+use super::fit_text::fit;
 use super::roots::shortened;
 use crate::report::text::number::{percent, probability, significant};
 use crate::report::text::table::Table;
