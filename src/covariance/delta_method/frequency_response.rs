@@ -4,8 +4,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::gradient::{Covariance2, Differential};
-use crate::covariance::covariance_error::CovarianceError;
-use crate::covariance::parameters::ParameterCovariance;
+use crate::covariance::{CovarianceError, ParameterCovariance};
 use crate::model::{StateSpace, resolvent_products};
 
 /// From where a response goes to the outputs.

@@ -12,8 +12,7 @@ use std::ops::Mul;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use crate::covariance::covariance_error::CovarianceError;
-use crate::covariance::parameters::{ParameterCovariance, ParameterLayout};
+use crate::covariance::{CovarianceError, ParameterCovariance, ParameterLayout};
 use crate::linalg::{all_finite, multiply};
 use crate::model::StateSpace;
 

@@ -3,8 +3,7 @@
 use num_complex::Complex64;
 
 use super::gradient::{Covariance2, Differential, projected_variance};
-use crate::covariance::covariance_error::CovarianceError;
-use crate::covariance::parameters::ParameterCovariance;
+use crate::covariance::{CovarianceError, ParameterCovariance};
 use crate::linalg::{LinalgError, eigen};
 use crate::model::{Pole, StateSpace, slowest_first};
 

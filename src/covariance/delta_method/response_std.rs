@@ -3,8 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::gradient::Differential;
-use crate::covariance::covariance_error::CovarianceError;
-use crate::covariance::parameters::ParameterCovariance;
+use crate::covariance::{CovarianceError, ParameterCovariance};
 use crate::linalg::multiply;
 use crate::model::StateSpace;
 

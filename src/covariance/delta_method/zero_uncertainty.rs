@@ -2,8 +2,7 @@
 
 use super::gradient::Differential;
 use super::pole_uncertainty::PoleUncertainty;
-use crate::covariance::covariance_error::CovarianceError;
-use crate::covariance::parameters::ParameterCovariance;
+use crate::covariance::{CovarianceError, ParameterCovariance};
 use crate::model::{StateSpace, zero_directions};
 
 /// Zeros with their uncertainty, in the order of [`StateSpace::zeros`]. First order, with the left and

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::super::knudsen::{Observability, Regression, inputs};
 use super::super::pem::Signals;
 use super::{BaselineEstimate, ProjectionWeight, noise_model, weighted_observability};
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::linalg::{
     least_squares, multiply, multiply_nt, pseudo_inverse, qr_r, solve_upper, spectral_radius,
 };

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::super::knudsen::{Regression, extended_observability};
 use super::{BaselineEstimate, ProjectionWeight, noise_model, weighted_observability};
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::linalg::{least_squares, multiply, multiply_nt, pseudo_inverse};
 use crate::model::StateSpace;
 

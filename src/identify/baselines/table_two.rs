@@ -6,7 +6,7 @@ use super::super::knudsen::{
 };
 use super::super::pem::{Form, STEPS, prediction_error_method};
 use super::{BaselineEstimate, ProjectionWeight, n4sid, subid};
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::log::Log;
 use crate::model::StateSpace;
 use crate::moments::{PanelQr, RFactor, Trend};

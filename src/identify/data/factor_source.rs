@@ -6,7 +6,7 @@ use super::delay::AlignedColumns;
 use super::memory_need::Sizes;
 use super::recording_moments::Data;
 use super::records::Records;
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::moments::{RFactor, Trend};
 
 /// The recordings behind an identification. Factors come from moments that are already in memory, so asking for

@@ -1,9 +1,7 @@
 //! The windows that are asked for, and the lags that the moments need for them.
 
 use super::memory_need::Sizes;
-use crate::identify::horizon;
-use crate::identify::identify_error::IdentifyError;
-use crate::identify::options::{Options, Order};
+use crate::identify::{IdentifyError, Options, Order, horizon};
 
 /// Largest order `(p + 1) q` of the data factor that is chosen automatically.
 const LARGEST_AUTOMATIC_FACTOR: usize = 2000;

@@ -14,7 +14,7 @@
 //! The counts are measured ones; `tests/limits.rs` holds the sum against peaks.
 
 use crate::covariance::numbers_of_tests;
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::identify::options::{JACKKNIFE_BLOCKS, Options};
 use crate::limits::{self, of_numbers};
 use crate::log::BLOCK_ROWS;

@@ -3,7 +3,7 @@
 use super::delay::Aligner;
 use super::records::Records;
 use super::reduced_records::ReducedRecords;
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::identify::options::{JACKKNIFE_BLOCKS, Options};
 use crate::log::{Channel, LARGEST_SIZE};
 use crate::moments::{

@@ -1,7 +1,7 @@
 //! Where the samples come from: memory, or files that are streamed.
 
 use super::reduced_records::ReducedRecords;
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::log::{
     Block, Channel, Log, LogError, LogReader, LogSummary, Reading, RoleNeed, Roles, Source,
     check_same_channels, check_same_sampling,

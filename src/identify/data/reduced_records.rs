@@ -9,8 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::delay::Aligner;
 use super::lags::lags_needed;
-use crate::identify::identify_error::IdentifyError;
-use crate::identify::options::Options;
+use crate::identify::{IdentifyError, Options};
 use crate::log::{Channel, Log, check_same_channels, check_same_sampling};
 use crate::moments::{LagAccumulator, LagMoments};
 

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::future_regression::Regression;
 use super::observability::{Decomposition, LeastSquares, Observability};
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 
 /// The deterministic part of a model.
 #[derive(Debug, Clone)]

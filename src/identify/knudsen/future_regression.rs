@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::linalg::{multiply_tn, pseudo_inverse, qr_r, reciprocal_condition_upper, solve_upper};
 use crate::moments::RFactor;
 

@@ -15,7 +15,7 @@ use super::observability::{
 };
 use super::stochastic::{NoiseModel, ResidualStep, gain_of_factor, right_quotient};
 use crate::covariance::ParameterLayout;
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::linalg::{cholesky_upper, multiply, multiply_tn, solve_upper, solve_upper_transposed};
 
 /// Jacobian of `[theta; vech R]`, `theta` laid out by `layout`, `vech R` the lower triangle of the innovation

@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 
 use super::future_regression::Regression;
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::linalg::{
     LinalgError, multiply, multiply_tn, qr_thin, reciprocal_condition_upper, solve_upper,
     solve_upper_transposed, svd_thin,

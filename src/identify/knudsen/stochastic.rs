@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::future_regression::Regression;
 use super::observability::{LeastSquares, Observability};
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::linalg::{
     LinalgError, cholesky_upper, solve_upper, solve_upper_transposed, spectral_radius,
     stabilising_observer_gain,

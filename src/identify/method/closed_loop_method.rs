@@ -5,8 +5,8 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::{Decomposed, Estimated, Orders, Uncertain, Windows};
+use crate::identify::IdentifyError;
 use crate::identify::data::Source;
-use crate::identify::identify_error::IdentifyError;
 use crate::identify::subspace::{
     Estimate, Nested, NestedDecomposition, Prediction, decompose_nested, nested_system_matrices,
 };

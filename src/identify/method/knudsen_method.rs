@@ -4,9 +4,9 @@ use std::sync::{Arc, OnceLock};
 
 use super::{Decomposed, Estimated, Orders, Uncertain, Windows};
 use crate::covariance::ParameterCovariance;
+use crate::identify::IdentifyError;
 use crate::identify::algorithms::Stochastic;
 use crate::identify::data::Source;
-use crate::identify::identify_error::IdentifyError;
 use crate::identify::knudsen::{
     Decomposition, Influence, Knudsen, Observability, Regression, ResidualStep,
     extended_observability, jacobian, knudsen,

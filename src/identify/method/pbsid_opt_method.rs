@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::{Decomposed, Estimated, Orders, Uncertain, Windows};
 use crate::covariance::ParameterCovariance;
+use crate::identify::IdentifyError;
 use crate::identify::data::Source;
-use crate::identify::identify_error::IdentifyError;
 use crate::identify::subspace::{Decomposition, Estimate, decompose, system_matrices, varx};
 use crate::identify::variance::{Propagation, subspace_covariance, subspace_propagation};
 use crate::model::StateSpace;

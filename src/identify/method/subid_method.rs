@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::knudsen_method::{in_basis_of, regression};
 use super::{Decomposed, Estimated, Orders, Uncertain, Windows};
+use crate::identify::IdentifyError;
 use crate::identify::baselines::{BaselineEstimate, ProjectionWeight, subid};
 use crate::identify::data::Source;
-use crate::identify::identify_error::IdentifyError;
 use crate::identify::knudsen::Regression;
 use crate::identify::subspace::Weight;
 use crate::model::StateSpace;

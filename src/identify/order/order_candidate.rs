@@ -4,12 +4,11 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use crate::identify::data::Source;
-use crate::identify::identify_error::IdentifyError;
 use crate::identify::method::{Decomposed, Estimated, Windows};
-use crate::identify::options::{Options, Polish};
 use crate::identify::polish::{Effort, Polished, polish, reduced};
 use crate::identify::stable::with_stable_predictor;
 use crate::identify::subspace::{LARGEST_FOR_POLISH, state_covariance, truncation};
+use crate::identify::{IdentifyError, Options, Polish};
 use crate::model::StateSpace;
 
 /// The polish is also used when it gains this many times more (in chi-square) than the truncation can distort:

@@ -6,12 +6,10 @@ use super::evidence::{self, OrderEvidence};
 use super::order_candidate::{Candidate, Window, cost_p_value};
 use crate::identify::algorithms::Method;
 use crate::identify::data::{Sizes, Source};
-use crate::identify::horizon;
-use crate::identify::identify_error::IdentifyError;
 use crate::identify::method::{Decomposed, Windows};
-use crate::identify::options::{Options, Order};
 use crate::identify::polish::Effort;
 use crate::identify::subspace::{LARGEST_FOR_POLISH, Varx, Weight, decompose, varx};
+use crate::identify::{IdentifyError, Options, Order, horizon};
 use crate::linalg::spectral_radius;
 use crate::moments::RFactor;
 

@@ -12,15 +12,14 @@ use crate::covariance::{
 };
 use crate::identify::algorithms::Method;
 use crate::identify::data::{Data, Source};
-use crate::identify::identify_error::IdentifyError;
 use crate::identify::method::Estimated;
-use crate::identify::options::{CovarianceKind, Options, Order, Polish};
 use crate::identify::order::{
     Evidence, FreeRunRest, OrderEvidence, Selection, Windowed, cost_p_value, polish_is_used,
 };
 use crate::identify::polish::{Effort, Polished, coefficient_cost, polish, stabilised};
 use crate::identify::stable::{largest_stable_radius, with_poles_inside, with_stable_predictor};
 use crate::identify::subspace::{Varx, varx};
+use crate::identify::{CovarianceKind, IdentifyError, Options, Order, Polish};
 use crate::linalg::spectral_radius;
 use crate::model::StateSpace;
 use crate::moments::Trend;

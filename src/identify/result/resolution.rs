@@ -12,8 +12,8 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
+use crate::identify::IdentifyError;
 use crate::identify::data::Records;
-use crate::identify::identify_error::IdentifyError;
 use crate::identify::subspace::Varx;
 use crate::linalg::{
     LinalgError, cholesky_upper, multiply_tn, solve_upper, solve_upper_transposed,

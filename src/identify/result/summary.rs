@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::resolution::CoarseChannel;
 use crate::identify::algorithms::{Method, Stochastic};
-use crate::identify::options::{CovarianceKind, Polish};
 use crate::identify::order::{FreeRunRest, OrderEvidence};
 use crate::identify::subspace::Weight;
+use crate::identify::{CovarianceKind, Polish};
 use crate::moments::{Detrend, Route};
 
 /// Akaike's criterion of one past window.

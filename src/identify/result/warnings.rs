@@ -4,9 +4,9 @@ use super::resolution::{CoarseChannel, WORTH_A_WARNING};
 use super::summary::Summary;
 use crate::covariance::{PoleUncertainty, projected_variance};
 use crate::identify::algorithms::Method;
-use crate::identify::options::{Options, Polish};
 use crate::identify::order::REFEREE_LEVEL;
 use crate::identify::subspace::{LARGEST_FOR_POLISH, Varx};
+use crate::identify::{Options, Polish};
 use crate::moments::Route;
 
 /// Truncation that PBSID_opt itself no longer tolerates.

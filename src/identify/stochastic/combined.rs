@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{Stochastic, StochasticPart};
+use crate::identify::IdentifyError;
 use crate::identify::data::Source;
-use crate::identify::identify_error::IdentifyError;
 use crate::identify::method::{Decomposed, Estimated, Orders, Uncertain, Windows};
 use crate::identify::variance::Propagation;
 use crate::model::StateSpace;

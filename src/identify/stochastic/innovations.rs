@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::StochasticPart;
 use crate::covariance::ParameterLayout;
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::identify::method::Windows;
 use crate::identify::polish::Problem;
 use crate::identify::stable::with_stable_predictor;

@@ -19,7 +19,7 @@ use nalgebra::DMatrix;
 use super::pbsid_opt::{Estimate, Weight, state_regressions};
 use super::varx::{Varx, varx};
 use super::weighted::{WeightedSvd, in_users_units};
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::linalg::{
     cholesky_upper, multiply, multiply_nt, multiply_tn, pseudo_inverse, reciprocal_condition_upper,
     solve_upper, solve_upper_transposed,

@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 
 use super::varx::Varx;
 use super::weighted::{WeightedSvd, in_users_units};
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::linalg::{
     cholesky_upper, multiply, multiply_nt, pseudo_inverse, qr_thin, solve_upper,
     solve_upper_transposed,

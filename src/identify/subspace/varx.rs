@@ -3,7 +3,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::identify::identify_error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::linalg::{multiply_tn, pseudo_inverse, reciprocal_condition_upper, solve_upper};
 use crate::moments::RFactor;
 

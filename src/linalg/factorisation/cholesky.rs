@@ -5,8 +5,8 @@ use faer::linalg::cholesky::llt::factor::LltError;
 use nalgebra::DMatrix;
 
 use super::eigen::symmetric_eigen;
+use crate::linalg::LinalgError;
 use crate::linalg::exchange::view;
-use crate::linalg::linalg_error::LinalgError;
 
 /// Upper triangular `R` with positive diagonal and `R' R = G`, for symmetric positive definite `G`.
 ///

@@ -4,9 +4,9 @@ use faer::Side;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
+use crate::linalg::LinalgError;
 use crate::linalg::exchange::{owned, view};
 use crate::linalg::finite::all_finite;
-use crate::linalg::linalg_error::LinalgError;
 
 /// Eigenvalues of a real matrix with right and left eigenvectors.
 #[derive(Debug, Clone)]

@@ -3,8 +3,8 @@
 use nalgebra::DMatrix;
 
 use super::triangular::{reciprocal_condition_upper, solve_upper};
+use crate::linalg::LinalgError;
 use crate::linalg::exchange::{owned, view};
-use crate::linalg::linalg_error::LinalgError;
 use crate::linalg::product::multiply_tn;
 
 /// The `min(m, n) x n` upper triangular factor of an `m x n` matrix, rows signed so that the diagonal

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::linalg::LinalgError;
 use crate::linalg::exchange::{owned, view};
 use crate::linalg::finite::all_finite;
-use crate::linalg::linalg_error::LinalgError;
 
 /// Thin singular value decomposition `A = U diag(s) V'`, singular values in decreasing order.
 #[derive(Debug, Clone)]

@@ -3,7 +3,7 @@
 //! Rows of data are alike and most of the file, so they are looked at first: the separator is the one that cuts them into
 //! the same number of fields with the most numbers among them. The header is looked for above them.
 
-use crate::log::roles::Roles;
+use crate::log::Roles;
 use crate::log::text::{Channel, Header, fields, is_missing, is_number};
 use crate::log::time::Format;
 

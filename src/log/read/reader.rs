@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use crate::log::log_error::LogError;
+use crate::log::LogError;
 use crate::log::roles::{RoleNeed, Roles, assign};
 use crate::log::text::{Channel, Header, Lines, RowParser, Source, Stream};
 use crate::log::time::{Sampling, first_look, time_base};

@@ -1,7 +1,7 @@
 //! A file looked at as a whole: whatever a logger writes becomes columns of numbers and stamps.
 
 use super::layout::{self, Layout};
-use crate::log::log_error::LogError;
+use crate::log::LogError;
 use crate::log::roles::{Assigned, RoleNeed, Roles, assign};
 use crate::log::text::{Mark, Marks, RowParser, decode, fields, is_missing};
 use crate::log::time::{Stamps, counted, stamps};

@@ -11,7 +11,7 @@ use std::sync::Mutex;
 use flate2::bufread::MultiGzDecoder;
 use sha2::{Digest, Sha256};
 
-use crate::log::log_error::LogError;
+use crate::log::LogError;
 
 /// What was read of standard input, of which there is one in a process, to be read again; `None` once it is too much.
 static HEAD: Mutex<Option<Vec<u8>>> = Mutex::new(Some(Vec::new()));

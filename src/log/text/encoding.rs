@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
-use crate::log::log_error::LogError;
+use crate::log::LogError;
 
 /// Bytes that are looked at to tell UTF-16 without a byte order mark.
 const LOOKED_AT: usize = 4096;

@@ -3,7 +3,7 @@
 use std::io::{ErrorKind, Read};
 
 use super::byte_source::Stream;
-use crate::log::log_error::LogError;
+use crate::log::LogError;
 
 /// Large enough that a read costs little, small enough to stay in the cache while it is parsed.
 const CHUNK: usize = 256 * 1024;

@@ -1,7 +1,7 @@
 //! Samples that are missing: interpolated, or the recording is cut there.
 
 use super::time_grid::{BRIDGED, Piece};
-use crate::log::roles::Missing;
+use crate::log::Missing;
 
 /// Fewer samples in a row are left out when a recording is cut: they are shorter than the past that any model looks at.
 pub(crate) const SHORTEST: usize = 20;

@@ -4,8 +4,7 @@ use std::collections::HashSet;
 
 use super::sampling::{STEP_TOLERANCE, readable};
 use super::stamped_rows::{CONFLICTS, Rows, counted, typical_step};
-use crate::log::log_error::LogError;
-use crate::log::roles::Missing;
+use crate::log::{LogError, Missing};
 
 /// Share of rows that have the stamp of the row before from which on the stamps are taken to be coarse.
 const COARSE: f64 = 0.25;

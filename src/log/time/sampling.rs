@@ -3,10 +3,9 @@
 //! The step that rows are held against is the median of the first steps, which a few bad ones cannot move; the sample
 //! time reported is (last - first) / (N - 1), which averages the rounding of all time stamps away.
 
-use crate::log::log_error::LogError;
-use crate::log::roles::TimeUnit;
 use crate::log::sample_time::is_sample_time;
 use crate::log::text::Header;
+use crate::log::{LogError, TimeUnit};
 
 /// How far one step may be off, relative to the sample time.
 pub(crate) const STEP_TOLERANCE: f64 = 0.01;

@@ -1,7 +1,7 @@
 //! Rows with time stamps, before they are placed on a grid.
 
 use super::sampling::readable;
-use crate::log::log_error::LogError;
+use crate::log::LogError;
 
 /// Share of rows whose stamp may be in conflict with the others.
 pub(super) const CONFLICTS: f64 = 0.01;

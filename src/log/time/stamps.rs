@@ -2,9 +2,8 @@
 
 use super::sampling::time_unit;
 use super::stamp::{DAY, Format, iso};
-use crate::log::log_error::LogError;
-use crate::log::roles::{Roles, TimeUnit};
 use crate::log::text::{Header, Mark, decimal, is_missing};
+use crate::log::{LogError, Roles, TimeUnit};
 
 /// Seconds since 1970 of times that are taken for dates: 1979 to 2200. What a clock shows that counts from when it was
 /// switched on is less.

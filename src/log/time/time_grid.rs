@@ -6,8 +6,7 @@
 use super::repair::{repair, spread_coarse};
 use super::sampling::{GAP, STEP_TOLERANCE, check_drift, readable, shortest_within};
 use super::stamped_rows::{CONFLICTS, Rows, counted, typical_step};
-use crate::log::log_error::LogError;
-use crate::log::roles::Missing;
+use crate::log::{LogError, Missing};
 
 /// Samples missing in a row that are interpolated; more are a gap. Two points of a straight line between neighbours
 /// say little that the neighbours do not.

@@ -12,7 +12,7 @@ use std::sync::Mutex;
 
 use tempfile::NamedTempFile;
 
-use crate::log::log_error::LogError;
+use crate::log::LogError;
 
 /// How the names of parts begin and end.
 const PART: (&str, &str) = (".innovant-", ".part");

@@ -7,7 +7,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 
 use super::atomic::AtomicFile;
-use crate::log::log_error::LogError;
+use crate::log::LogError;
 use crate::log::sample_time::is_sample_time;
 use crate::log::text::Channel;
 

@@ -12,7 +12,7 @@ use crate::identify::{
 };
 use crate::linalg::Rows;
 use crate::model::Armax;
-use crate::report::document_error::DocumentError;
+use crate::report::DocumentError;
 use crate::report::json_layout::to_json;
 use crate::validate::Validation;
 

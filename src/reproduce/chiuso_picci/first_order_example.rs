@@ -3,10 +3,9 @@
 use super::PAPER_RUNS;
 use super::algorithm::Windows;
 use super::variance_study::Example;
-use crate::reproduce::Experiment;
 use crate::reproduce::document::Reproduction;
 use crate::reproduce::monte_carlo_runs::Study;
-use crate::reproduce::reproduce_error::ReproduceError;
+use crate::reproduce::{Experiment, ReproduceError};
 use crate::systems::chiuso_picci_one;
 
 /// Example 1 of Chiuso & Picci.

@@ -5,9 +5,8 @@ use num_complex::Complex64;
 use super::algorithm::{Algorithm, Failure, Found, Windows, algorithms};
 use crate::reproduce::figure::{Curve, Figure, Panel, Quantity, Role, Row, Table};
 use crate::reproduce::monte_carlo_runs::{Study, successes};
-use crate::reproduce::plain_numbers;
-use crate::reproduce::reproduce_error::ReproduceError;
 use crate::reproduce::statistics::{logarithmic_grid, mean, percentiles};
+use crate::reproduce::{ReproduceError, plain_numbers};
 use crate::systems::ClosedLoop;
 
 /// Points between two of the eight frequencies at which numbers are given.

@@ -6,8 +6,7 @@ use super::variance::{Plan, failures};
 use super::{PAPER, PAPER_RUNS};
 use crate::reproduce::document::{Fact, Reproduction};
 use crate::reproduce::monte_carlo_runs::Study;
-use crate::reproduce::reproduce_error::ReproduceError;
-use crate::reproduce::{Experiment, document_of};
+use crate::reproduce::{Experiment, ReproduceError, document_of};
 use crate::systems::ClosedLoop;
 
 /// An example of the paper.

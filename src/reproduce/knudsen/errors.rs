@@ -5,9 +5,8 @@ use super::methods::{Kind, Method, REFERENCE, bound, methods};
 use crate::reproduce::data_factor::Failure;
 use crate::reproduce::figure::{BarSeries, Bars, Row, Table, all_finite};
 use crate::reproduce::monte_carlo_runs::{Study, successes};
-use crate::reproduce::plain_numbers;
-use crate::reproduce::reproduce_error::ReproduceError;
 use crate::reproduce::statistics::{mean, median, percentiles, root_mean_square};
+use crate::reproduce::{ReproduceError, plain_numbers};
 use crate::systems::KnudsenExample;
 
 /// Bars beyond this many times tk-chol are cut: the paper's y-axes are "truncated" too.

@@ -5,8 +5,7 @@ use super::knudsen_statements::statements;
 use super::{PAPER, PAPER_RUNS, SAMPLES};
 use crate::reproduce::document::{Fact, Reproduction};
 use crate::reproduce::monte_carlo_runs::Study;
-use crate::reproduce::reproduce_error::ReproduceError;
-use crate::reproduce::{Experiment, document_of};
+use crate::reproduce::{Experiment, ReproduceError, document_of};
 use crate::systems::{KnudsenExample, knudsen_armax, knudsen_bj, knudsen_vo};
 
 /// Section 6 of Knudsen for one of its systems.

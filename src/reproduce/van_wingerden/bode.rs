@@ -9,8 +9,7 @@ use crate::covariance::{Path, response_bands};
 use crate::identify::variance::subspace_covariance;
 use crate::reproduce::figure::{Curve, Figure, Panel, Quantity, Role, Row, Table};
 use crate::reproduce::monte_carlo_runs::{Study, successes};
-use crate::reproduce::plain_numbers;
-use crate::reproduce::reproduce_error::ReproduceError;
+use crate::reproduce::{ReproduceError, plain_numbers};
 use crate::systems::TestSystem;
 use crate::{Options, identify};
 

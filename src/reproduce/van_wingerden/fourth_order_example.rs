@@ -10,9 +10,8 @@ use crate::linalg::{LinalgError, spectral_radius};
 use crate::reproduce::document::{Agreement, Comparison, Fact, Reproduction};
 use crate::reproduce::monte_carlo_runs::Study;
 use crate::reproduce::plain_numbers::{number, percent, percent_with_error};
-use crate::reproduce::reproduce_error::ReproduceError;
 use crate::reproduce::statistics::logarithmic_grid;
-use crate::reproduce::{Experiment, document_of};
+use crate::reproduce::{Experiment, ReproduceError, document_of};
 use crate::systems::{TestSystem, pbsid_toolbox, van_wingerden_one};
 
 /// Example I of van Wingerden.

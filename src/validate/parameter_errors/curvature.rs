@@ -16,8 +16,7 @@ use crate::linalg::{multiply, spectral_radius};
 use crate::model::{Predictor, StateSpace};
 use crate::moments::{Detrend, Gram, LagAccumulator};
 use crate::validate::residuals::{Partial, Start, cut};
-use crate::validate::validate_error::ValidateError;
-use crate::validate::validation_options::RecordView;
+use crate::validate::{RecordView, ValidateError};
 
 /// Pairs of models drawn, one on either side of the estimate.
 const PAIRS: usize = 3;

@@ -13,8 +13,8 @@ use nalgebra::DMatrix;
 use crate::covariance::ParameterCovariance;
 use crate::linalg::multiply;
 use crate::model::StateSpace;
+use crate::validate::RecordView;
 use crate::validate::residuals::Start;
-use crate::validate::validation_options::RecordView;
 
 /// Samples handled at a time.
 const BLOCK: usize = 512;

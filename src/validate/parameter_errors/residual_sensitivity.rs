@@ -9,8 +9,7 @@ use crate::covariance::{ParameterCovariance, samples_followed};
 use crate::linalg::{multiply, multiply_nt, symmetric_eigen};
 use crate::model::StateSpace;
 use crate::validate::residuals::{Partial, Start};
-use crate::validate::validate_error::ValidateError;
-use crate::validate::validation_options::{RecordView, Relation};
+use crate::validate::{RecordView, Relation, ValidateError};
 
 /// Samples handled at a time.
 const BLOCK: usize = 512;

@@ -21,8 +21,7 @@ use super::averages::Averages;
 use super::residual_sensitivity::Sensitivity;
 use crate::linalg::{multiply, multiply_nt, multiply_tn, svd_thin, symmetric_eigen};
 use crate::validate::residuals::Partial;
-use crate::validate::validate_error::ValidateError;
-use crate::validate::validation_options::Relation;
+use crate::validate::{Relation, ValidateError};
 
 /// Variances below this share of what they were before the estimation count as fitted away. An effect
 /// that the model leaves out, of size `delta` along such a direction, is itself fitted away but for

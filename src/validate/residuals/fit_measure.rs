@@ -1,8 +1,6 @@
 //! Fit measures, accumulated block by block.
 
-use crate::validate::result::{FitMeasure, OutputFit};
-use crate::validate::validate_error::ValidateError;
-use crate::validate::validation_options::ValidationOptions;
+use crate::validate::{FitMeasure, OutputFit, ValidateError, ValidationOptions};
 
 /// Sums of one output over one record at a time.
 #[derive(Debug, Clone, Default)]

@@ -6,8 +6,7 @@ use super::fit_measure::FitSums;
 use crate::linalg::spectral_radius;
 use crate::model::{ModelError, Predictor, Simulator, StateSpace, estimate_initial_state};
 use crate::moments::{Detrend, Gram, LagAccumulator};
-use crate::validate::validate_error::ValidateError;
-use crate::validate::validation_options::RecordView;
+use crate::validate::{RecordView, ValidateError};
 
 /// Samples handled at a time.
 const BLOCK: usize = 4096;
