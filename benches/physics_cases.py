@@ -431,6 +431,12 @@ class Scene:
     def into(self, u): return {k: None for k in [u] + self.m.holders(u)}
 
 
+def of_scene(effect):
+    """An effect named by its arguments: given a scene it is sized, and then built at a strength."""
+    return lambda *arguments: lambda scene: effect(scene, *arguments)
+
+
+@of_scene
 def friction(s, h, v, stribeck=False):
     F, sv, r = s.force(h), s.std(v), s.rng.uniform(.6, 1.2) if stribeck else 0.0
     vs = sv*s.rng.uniform(.3, .6); zm = sv*s.dt*s.rng.uniform(.8, 2); eps = .03*sv
@@ -448,6 +454,7 @@ def friction(s, h, v, stribeck=False):
     return make
 
 
+@of_scene
 def drag(s, h, v, power=2, air=""):
     F = s.force(h); rel = f"({v})"; x = s.std(v) + abs(float(np.mean(s.Z[v])))
     e = f"-#c*{rel}*abs({rel})" if power == 2 else f"-#c*{rel}^3"
@@ -455,17 +462,20 @@ def drag(s, h, v, power=2, air=""):
     return lambda a: Effect(name, [name] + (["cubic_damping"] if power == 3 else []), s.place(h), s.names(v), dict(c=(.2*F*a/x**power, "")), add={h: e}, knob="c", law=(v, s.names(v), e), fit=["c"])
 
 
+@of_scene
 def asymmetric(s, h, v):
     F, sign = s.force(h), s.rng.choice([-1, 1]); e = f"-#c*{'max' if sign > 0 else 'min'}({v}, 0)"
     return lambda a: Effect("asymmetric_damping", ["asymmetric_damping", "asymmetric_damper"], s.place(h), s.names(v), dict(c=(.2*F*a/s.std(v), "")), add={h: e}, knob="c", law=(v, s.names(v), e), fit=["c"])
 
 
+@of_scene
 def stiffening(s, h, x, power=3, about=0.0):
     F = s.force(h); d = f"({x} - #x0)" if about else x; w = max(abs(s.q(x, .99) - about), abs(s.q(x, .01) - about)); e = f"-#k*{d}^{power}"
     name = "cubic_stiffness" if power == 3 else "quadratic_stiffness"
     return lambda a: Effect(name, [name] + (["stiffening", "hardening_spring"] if power == 3 else []), s.place(h), s.names(x), dict(k=(.3*F*a/w**power, ""), x0=(about, s.m.unit.get(x) if about else None)), add={h: e}, knob="k", law=(x, s.names(x), e), fit=["k"])
 
 
+@of_scene
 def end_stop(s, h, x, v, both=True):
     F = s.force(h); q = s.rng.uniform(.62, .88); mid = .5*(s.q(x, .02) + s.q(x, .98)) if not both else 0.0
     side = 1 if both or s.rng.random() < .5 else -1
@@ -481,6 +491,7 @@ def end_stop(s, h, x, v, both=True):
     return make
 
 
+@of_scene
 def cogging(s, h, ang, waves=None):
     F, span = s.force(h), s.q(ang, .98) - s.q(ang, .02)
     n = float(waves or max(1, round(2*np.pi*s.rng.uniform(4, 9)/span))); n = min(n, 8.0) if span > 20 else n; ph = s.rng.uniform(0, 6)
@@ -492,6 +503,7 @@ def cogging(s, h, ang, waves=None):
     return make
 
 
+@of_scene
 def periodic(s, h, at=None):
     F = s.force(h); f = 1/(s.tc*s.rng.uniform(.8, 3.5)); ph = s.rng.uniform(0, 6)
     at = dict(s.place(h))
@@ -503,6 +515,7 @@ def periodic(s, h, at=None):
     return make
 
 
+@of_scene
 def load_step(s, h, sign=0, words="", accept=()):
     F, end = s.force(h), s.n*s.dt; t0 = end*s.rng.uniform(.25, .7); sg = sign or s.rng.choice([-1, 1]); F = max(F, .1*s.coef(h)*s.std(h)/s.tc) if h in s.m.states else F
 
@@ -513,6 +526,7 @@ def load_step(s, h, sign=0, words="", accept=()):
     return make
 
 
+@of_scene
 def change(s, p, enters, sign=0, words="", accept=(), depends=(), slow=None):
     end = s.n*s.dt; t0 = end*s.rng.uniform(.25, .65); sg = sign or s.rng.choice([-1, 1]); slow = s.rng.random() < .3 if slow is None else slow; ramp = end - t0 if slow else 3*s.dt
 
@@ -523,16 +537,19 @@ def change(s, p, enters, sign=0, words="", accept=(), depends=(), slow=None):
     return make
 
 
+@of_scene
 def missing(s, u, h, words="", e="", accept=()):
     F = s.force(h); x = s.std(u) + .3*abs(float(np.mean(s.Z[u]))); at = dict.fromkeys(s.place(h)); e = e or u; sg = s.rng.choice([-1, 1])
     return lambda a: Effect("missing_input", ["missing_input"] + list(accept), at, [u], dict(c=((1 if words else sg)*.2*F*a/x, "")), add={h: f"#c*({e})"}, words=words, knob="c", fit=["c"])
 
 
+@of_scene
 def cross(s, v, h, words=""):
     F = s.force(h); sg = s.rng.choice([-1, 1])
     return lambda a: Effect("cross_coupling", ["cross_coupling", "missing_input"], dict.fromkeys(s.place(h)), s.names(v), dict(c=(sg*.2*F*a/(s.std(v) + .2*abs(np.mean(s.Z[v]))), "")), add={h: f"#c*{v}"}, words=words, knob="c", fit=["c"])
 
 
+@of_scene
 def in_saturation(s, u):
     lo, hi = s.q(u, .02), s.q(u, .98); both = lo < -.3*hi; base = 0.0 if both or lo >= 0 else lo; top = max(hi, -lo) if both else hi; q = s.std(u)
 
@@ -546,6 +563,7 @@ def in_saturation(s, u):
     return make
 
 
+@of_scene
 def in_dead_zone(s, u):
     def make(a):
         e = Effect("input_dead_zone", ["input_dead_zone", "dead_zone"], s.into(u), [u], dict(d=(.25*s.std(u)*a, s.m.unit[u])), put={u: f"sign({u})*softplus(abs({u}) - #d, 0.05*#d)"}, knob="d")
@@ -554,6 +572,7 @@ def in_dead_zone(s, u):
     return make
 
 
+@of_scene
 def in_backlash(s, u, stick=False):
     lag = .4*s.dt
 
@@ -571,6 +590,7 @@ def in_backlash(s, u, stick=False):
     return make
 
 
+@of_scene
 def in_hysteresis(s, u):
     """The input's effect lags in its amplitude (Bouc-Wen), as of iron or a piezo."""
     def make(a):
@@ -581,6 +601,7 @@ def in_hysteresis(s, u):
     return make
 
 
+@of_scene
 def in_rate(s, u):
     d = np.diff(s.Z[u])/s.dt; r = float(np.std(s.Z[u]))/s.tc; mx = float(np.max(np.abs(d)))
 
@@ -592,23 +613,28 @@ def in_rate(s, u):
     return make
 
 
+@of_scene
 def in_delay(s, u):
     return lambda a: Effect("input_delay", ["input_delay", "delay"], s.into(u), [u], dict(T=(max(.12*s.tc*a, .7*s.dt), "s")), mem={"p": (f"#p = @{u};", f"#p = past(${u}, t, #T);")}, put={u: "#p"}, knob="T", fit=["T"])
 
 
+@of_scene
 def in_lag(s, u):
     return lambda a: Effect("actuator_lag", ["actuator_lag", "input_lag"], s.into(u), [u], dict(T=(max(.12*s.tc*a, .5*s.dt), "s")), states={"z": (u, f"(@{u} - #z)/#T")}, put={u: "#z"}, knob="T", fit=["T"])
 
 
+@of_scene
 def in_curve(s, u):
-    return law(s, u, u)
+    return law(u, u)(s)
 
 
+@of_scene
 def y_offset(s, y):
     sg = s.rng.choice([-1, 1])
     return lambda a: Effect("sensor_offset", ["sensor_offset", "sensor_bias"], {y: None}, [], dict(b=(sg*.2*s.std(y)*a, s.m.unit[y])), put={y: f"{y} + #b"}, knob="b", fit=["b"])
 
 
+@of_scene
 def y_drift(s, y):
     sg = s.rng.choice([-1, 1]); end = s.n*s.dt
 
@@ -619,15 +645,18 @@ def y_drift(s, y):
     return make
 
 
+@of_scene
 def y_lag(s, y):
     return lambda a: Effect("sensor_lag", ["sensor_lag", "sensor_delay", "actuator_lag"], {y: None}, s.names(y), dict(T=(max(.12*s.tc*a, .4*s.dt), "s")), states={"z": ("late:" + y, f"({y} - #z)/#T")}, put={y: "#z"}, knob="T", fit=["T"])
 
 
+@of_scene
 def y_scale(s, y):
     sg = s.rng.choice([-1, 1])
     return lambda a: Effect("sensor_scale", ["sensor_scale", "sensor_gain"], {y: None}, s.names(y), dict(s=(sg*min(.1*a, .6), "")), put={y: f"{y}*(1 + #s)"}, knob="s", fit=["s"])
 
 
+@of_scene
 def y_saturation(s, y):
     lo, hi = s.q(y, .003), s.q(y, .997); up = s.rng.random() < .75 or lo >= 0; sd = s.std(y)
 
@@ -639,6 +668,7 @@ def y_saturation(s, y):
     return make
 
 
+@of_scene
 def mode(s, h, v, x="", words=""):
     M = abs(s.coef(h)); f0 = s.rng.uniform(.6, 2.2)/s.tc; f0 = min(f0, .12/s.dt); zeta = s.rng.uniform(.01, .04)
 
@@ -649,27 +679,32 @@ def mode(s, h, v, x="", words=""):
     return make
 
 
+@of_scene
 def radiation(s, h, T, Ta="20", kelvin=False):
     F = s.force(h); k = 0 if kelvin else 273.15; m = float(np.mean(s.Z[T])) + k; e = f"-#e*(({T} + {k})^4 - ({Ta} + {k})^4)"
     return lambda a: Effect("radiation", ["radiation"], dict.fromkeys(s.place(h)), s.names(T) + [Ta], dict(e=(.4*F*a/(m**3*s.std(T)), "W/K4")), add={h: e}, knob="e", fit=["e"])
 
 
+@of_scene
 def convection(s, h, T, Ta):
     F = s.force(h); d = float(np.mean(np.abs(s.Z[T] - (s.Z[Ta] if Ta in s.Z else float(Ta))))) + 1e-9; e = f"-#b*({T} - {Ta})*abs({T} - {Ta})^0.25"
     return lambda a: Effect("natural_convection", ["natural_convection", "convection_change"], dict.fromkeys(s.place(h)), s.names(T) + [Ta], dict(b=(.4*F*a/d**1.25, "W/K^1.25")), add={h: e}, knob="b", fit=["b"])
 
 
+@of_scene
 def warming(s, R, i, enters, tau):
     """A resistance that its own loss heats."""
     P = float(np.mean(s.m.params[R]*s.Z[i]**2)) + 1e-12; tau = tau*s.rng.uniform(.7, 1.4)
     return lambda a: Effect("temperature_dependent_resistance", ["temperature_dependent_resistance"], dict.fromkeys(enters), s.names(i), dict(Rth=(40*a/P, "K/W"), tau=(tau, "s")), states={"dT": ("0", f"(#Rth*{R}*{i}^2 - #dT)/#tau")}, put={R: f"{R}*(1 + 0.0039*#dT)"}, knob="Rth", fit=["Rth", "tau"])
 
 
+@of_scene
 def element(s, u, T):
     """A heater on a fixed voltage, whose resistance rises with its temperature."""
     return lambda a: Effect("temperature_dependent_resistance", ["temperature_dependent_resistance", "position_dependent_gain"], s.into(u), [T, u], dict(a=(.15*a/(s.q(T, .95) - s.q(T, .05)), "1/K")), put={u: f"{u}/(1 + #a*({T} - 20))"}, knob="a", fit=["a"])
 
 
+@of_scene
 def leak(s, h, x, law_="sqrt", words="", ref="0", accept=()):
     F = s.force(h); x0 = s.q(x, s.rng.uniform(.05, .4)) if law_ == "hole" else 0.0; w = s.q(x, .95) - x0
     e = f"-#k*sqrt(2*Modelica.Constants.g_n*max({x} - #h0, 0))" if law_ != "linear" else f"-#k*({x} - {ref})"
@@ -677,6 +712,7 @@ def leak(s, h, x, law_="sqrt", words="", ref="0", accept=()):
     return lambda a: Effect("leak", ["leak", "tank_outflow"] + list(accept), s.place(h), s.names(x), dict(k=(.3*F*a/size, ""), h0=(x0, s.m.unit[x] if x0 else None)), add={h: e}, words=words, knob="k", law=(x, s.names(x), e), fit=["k"] + (["h0"] if x0 else []))
 
 
+@of_scene
 def overflow(s, h, x, valve=False):
     F = s.force(h); H = s.q(x, s.rng.uniform(.6, .85)); w = s.q(x, .995) - H
 
@@ -687,6 +723,7 @@ def overflow(s, h, x, valve=False):
     return make
 
 
+@of_scene
 def play(s, shaft, twist, k, words="play in the shaft"):
     """Play in an elastic transmission: its torque keeps away within the gap."""
     def make(a):
@@ -700,6 +737,7 @@ def play(s, shaft, twist, k, words="play in the shaft"):
 SHAPES = ["a Gaussian", "two bumps", "a loss that rises and falls", "a saturating exponential", "a smooth step"]
 
 
+@of_scene
 def law(s, h, z, shape=""):
     """A curve of one variable that no library lists."""
     lo, hi = s.q(z, .03), s.q(z, .97); w = hi - lo; shape = shape or str(s.rng.choice(SHAPES)); sg = s.rng.choice([-1, 1]); F = s.force(h) if h not in s.m.inputs else s.std(h)
@@ -721,8 +759,9 @@ def law(s, h, z, shape=""):
 PLANTS = {}
 
 
-def plant(name, text, **spec):
-    PLANTS[name] = dict(spec, text=text.strip("\n") + "\n")
+def plant(name, text, free=True, **spec):
+    """A class of plants; one that is not `free` cannot run without its controller."""
+    PLANTS[name] = dict(spec, free=free, text=text.strip("\n") + "\n")
 
 
 plant("maglev", """
@@ -746,8 +785,8 @@ equation
   ic = i;
 end Maglev;
 """, dt=.002, tc=120, u=dict(u=(10.635, 1.5), ab=(0, .8)), y=dict(gap=.0012, ic=.12), scale=dict(z=.001, v=.02, i=.1), track=dict(u="gap"), ry=.6, lim=dict(u=(0, 24)), loop=1, free=False, dither=.15,
-      effects=[lambda s: missing(s, "ab", "v", "the frame shakes", "m*ab"), lambda s: load_step(s, "v", 1, "another weight"), lambda s: warming(s, "R", "i", ["i"], .8), lambda s: in_delay(s, "u"), lambda s: in_lag(s, "u"), lambda s: y_lag(s, "gap"), lambda s: y_scale(s, "gap"),
-               lambda s: law(s, "v", "z"), lambda s: mode(s, "v", "v", "z"), lambda s: change(s, "Cm", ["v"], -1, "turns are shorted", ["load_step"]), lambda s: periodic(s, "v"), lambda s: drag(s, "v", "v"), lambda s: in_hysteresis(s, "u"), lambda s: y_saturation(s, "gap"), lambda s: y_offset(s, "ic")])
+      effects=[missing("ab", "v", "the frame shakes", "m*ab"), load_step("v", 1, "another weight"), warming("R", "i", ["i"], .8), in_delay("u"), in_lag("u"), y_lag("gap"), y_scale("gap"),
+               law("v", "z"), mode("v", "v", "z"), change("Cm", ["v"], -1, "turns are shorted", ["load_step"]), periodic("v"), drag("v", "v"), in_hysteresis("u"), y_saturation("gap"), y_offset("ic")])
 
 plant("cart_pole", """
 model CartPole "pole balanced on a cart"
@@ -773,8 +812,8 @@ equation
   thm = th;
 end CartPole;
 """, dt=.01, tc=150, u=dict(u=(0, 1.5), tilt=(0, .02)), y=dict(xm=.15, thm=.03), scale=dict(x=.1, v=.1, th=.03, w=.1), track=dict(u="xm"), ry=1, lim=dict(u=(-12, 12)), loop=1, free=False, dither=.3, places=dict(v=dict(v=1, u=1/1.8)), unit=dict(v="N", w="m/s2"),
-      effects=[lambda s: friction(s, "v", "v"), lambda s: friction(s, "v", "v", True), lambda s: in_dead_zone(s, "u"), lambda s: in_backlash(s, "u"), lambda s: in_delay(s, "u"), lambda s: in_lag(s, "u"), lambda s: drag(s, "v", "v"), lambda s: load_step(s, "v", 0, "", ["input_offset"]), lambda s: cogging(s, "v", "x"),
-               lambda s: missing(s, "tilt", "v", "gravity along the rail", "-(M + m)*Modelica.Constants.g_n*tilt"), lambda s: y_lag(s, "thm"), lambda s: y_offset(s, "thm"), lambda s: law(s, "v", "x"), lambda s: law(s, "v", "v", SHAPES[2]), lambda s: change(s, "kF", ["v", "u"], 0, "the drive weakens", ()), lambda s: asymmetric(s, "v", "v")])
+      effects=[friction("v", "v"), friction("v", "v", True), in_dead_zone("u"), in_backlash("u"), in_delay("u"), in_lag("u"), drag("v", "v"), load_step("v", 0, "", ["input_offset"]), cogging("v", "x"),
+               missing("tilt", "v", "gravity along the rail", "-(M + m)*Modelica.Constants.g_n*tilt"), y_lag("thm"), y_offset("thm"), law("v", "x"), law("v", "v", SHAPES[2]), change("kF", ["v", "u"], 0, "the drive weakens", ()), asymmetric("v", "v")])
 
 plant("ship", """
 model Ship "heading of a ship"
@@ -795,9 +834,9 @@ equation
   heading = psi;
   rate = r;
 end Ship;
-""", dt=.5, tc=60, u=dict(delta=(0, .15), vw=(2, 5)), y=dict(heading=.4, rate=.015), scale=dict(psi=.3, r=.01, d=.1), track=dict(delta="heading"), ry=1.2, lim=dict(delta=(-.6, .6)), loop=.7, free=True, far=True, unit=dict(r="rad/s"),
-      effects=[lambda s: drag(s, "r", "r", 3), lambda s: drag(s, "r", "r", 2), lambda s: in_saturation(s, "delta"), lambda s: in_rate(s, "delta"), lambda s: in_dead_zone(s, "delta"), lambda s: in_backlash(s, "delta"), lambda s: in_delay(s, "delta"), lambda s: in_curve(s, "delta"),
-               lambda s: missing(s, "vw", "r", "wind"), lambda s: load_step(s, "r"), lambda s: periodic(s, "r"), lambda s: change(s, "K", ["r", "d", "delta"], -1, "the ship slows down"), lambda s: y_scale(s, "rate"), lambda s: y_lag(s, "rate"), lambda s: y_offset(s, "rate"), lambda s: law(s, "r", "r", SHAPES[2]), lambda s: y_drift(s, "rate")])
+""", dt=.5, tc=60, u=dict(delta=(0, .15), vw=(2, 5)), y=dict(heading=.4, rate=.015), scale=dict(psi=.3, r=.01, d=.1), track=dict(delta="heading"), ry=1.2, lim=dict(delta=(-.6, .6)), loop=.7, far=True, unit=dict(r="rad/s"),
+      effects=[drag("r", "r", 3), drag("r", "r", 2), in_saturation("delta"), in_rate("delta"), in_dead_zone("delta"), in_backlash("delta"), in_delay("delta"), in_curve("delta"),
+               missing("vw", "r", "wind"), load_step("r"), periodic("r"), change("K", ["r", "d", "delta"], -1, "the ship slows down"), y_scale("rate"), y_lag("rate"), y_offset("rate"), law("r", "r", SHAPES[2]), y_drift("rate")])
 
 plant("elastic_drive", """
 model ElasticDrive "two inertias and an elastic shaft"
@@ -821,11 +860,11 @@ equation
   n1 = w1;
   n2 = w2;
 end ElasticDrive;
-""", dt=.004, tc=80, u=dict(Tm=(0, 1.2), TL=(0, .4)), y=dict(n1=10, n2=10), scale=dict(w1=5, w2=5, phi=.02), track=dict(Tm="n2"), ry=1, lim=dict(Tm=(-6, 6)), loop=.45, free=True, soft=3,
+""", dt=.004, tc=80, u=dict(Tm=(0, 1.2), TL=(0, .4)), y=dict(n1=10, n2=10), scale=dict(w1=5, w2=5, phi=.02), track=dict(Tm="n2"), ry=1, lim=dict(Tm=(-6, 6)), loop=.45, soft=3,
       places=dict(Ts=dict(Ts=1, w1=-1, w2=1), w1=dict(w1=1, Tm=1)), unit=dict(w1="N.m", w2="N.m"),
-      effects=[lambda s: play(s, "Ts", "phi", "k"), lambda s: friction(s, "w2", "w2"), lambda s: friction(s, "w1", "w1", True), lambda s: drag(s, "w2", "w2"), lambda s: drag(s, "w2", "w2", 3), lambda s: stiffening(s, "Ts", "phi"), lambda s: change(s, "k", ["Ts", "w1", "w2"], -1, "a crack in the shaft", (), ["phi"]),
-               lambda s: change(s, "J2", ["w2"], 1, "a part is clamped", ()), lambda s: load_step(s, "w2"), lambda s: missing(s, "TL", "w2", "the brake", "-TL"), lambda s: law(s, "w2", "w2", SHAPES[2]), lambda s: law(s, "w2", "w2"), lambda s: asymmetric(s, "w2", "w2"), lambda s: in_saturation(s, "Tm"), lambda s: in_lag(s, "Tm"), lambda s: in_delay(s, "Tm"),
-               lambda s: y_scale(s, "n2"), lambda s: y_lag(s, "n2"), lambda s: mode(s, "w2", "w2", "", "another inertia on the load"), lambda s: periodic(s, "w2"), lambda s: in_hysteresis(s, "Tm")])
+      effects=[play("Ts", "phi", "k"), friction("w2", "w2"), friction("w1", "w1", True), drag("w2", "w2"), drag("w2", "w2", 3), stiffening("Ts", "phi"), change("k", ["Ts", "w1", "w2"], -1, "a crack in the shaft", (), ["phi"]),
+               change("J2", ["w2"], 1, "a part is clamped", ()), load_step("w2"), missing("TL", "w2", "the brake", "-TL"), law("w2", "w2", SHAPES[2]), law("w2", "w2"), asymmetric("w2", "w2"), in_saturation("Tm"), in_lag("Tm"), in_delay("Tm"),
+               y_scale("n2"), y_lag("n2"), mode("w2", "w2", "", "another inertia on the load"), periodic("w2"), in_hysteresis("Tm")])
 
 plant("hydraulic", """
 model Hydraulic "hydraulic cylinder with a proportional valve"
@@ -852,10 +891,10 @@ equation
   xs = x;
   pL = p;
 end Hydraulic;
-""", dt=.004, tc=90, u=dict(u=(0, 1.5), F=(0, 500)), y=dict(xs=.02, pL=3e5), scale=dict(x=.02, v=.05, p=2e5), track=dict(u="xs"), ry=1.5, lim=dict(u=(-10, 10)), loop=.75, free=True, far=True,
+""", dt=.004, tc=90, u=dict(u=(0, 1.5), F=(0, 500)), y=dict(xs=.02, pL=3e5), scale=dict(x=.02, v=.05, p=2e5), track=dict(u="xs"), ry=1.5, lim=dict(u=(-10, 10)), loop=.75, far=True,
       places=dict(q=dict(q=1, p=1)), unit=dict(v="N", p="m3/s", q="m3/s"),
-      effects=[lambda s: friction(s, "v", "v"), lambda s: friction(s, "v", "v", True), lambda s: in_dead_zone(s, "u"), lambda s: in_backlash(s, "u"), lambda s: in_backlash(s, "u", True), lambda s: in_delay(s, "u"), lambda s: in_lag(s, "u"), lambda s: in_rate(s, "u"), lambda s: end_stop(s, "v", "x", "v", False), lambda s: stiffening(s, "v", "x"),
-               lambda s: load_step(s, "v"), lambda s: missing(s, "F", "v", "the external force"), lambda s: change(s, "ps", ["q", "p"], -1, "the pump loses pressure"), lambda s: change(s, "ks", ["v"], -1, "the specimen yields", (), ["x"]), lambda s: law(s, "v", "x"), lambda s: law(s, "v", "v", SHAPES[2]), lambda s: y_lag(s, "pL"), lambda s: y_offset(s, "pL"), lambda s: drag(s, "v", "v"), lambda s: mode(s, "v", "v", "x", "a mass on the table"), lambda s: in_curve(s, "u"), lambda s: asymmetric(s, "v", "v")])
+      effects=[friction("v", "v"), friction("v", "v", True), in_dead_zone("u"), in_backlash("u"), in_backlash("u", True), in_delay("u"), in_lag("u"), in_rate("u"), end_stop("v", "x", "v", False), stiffening("v", "x"),
+               load_step("v"), missing("F", "v", "the external force"), change("ps", ["q", "p"], -1, "the pump loses pressure"), change("ks", ["v"], -1, "the specimen yields", (), ["x"]), law("v", "x"), law("v", "v", SHAPES[2]), y_lag("pL"), y_offset("pL"), drag("v", "v"), mode("v", "v", "x", "a mass on the table"), in_curve("u"), asymmetric("v", "v")])
 
 plant("pneumatic", """
 model Pneumatic "receiver and chamber with a control valve"
@@ -877,10 +916,10 @@ equation
   g1 = p1;
   g2 = p2;
 end Pneumatic;
-""", dt=.25, tc=90, u=dict(u=(3.1, .9), Ta=(22, 3)), y=dict(g1=.8, g2=.5), scale=dict(p1=.5, p2=.4), track=dict(u="g2"), ry=1, lim=dict(u=(0, 10)), loop=.5, free=True,
+""", dt=.25, tc=90, u=dict(u=(3.1, .9), Ta=(22, 3)), y=dict(g1=.8, g2=.5), scale=dict(p1=.5, p2=.4), track=dict(u="g2"), ry=1, lim=dict(u=(0, 10)), loop=.5,
       places=dict(q12=dict(q12=1, p1=-1, p2=1)), unit=dict(p1="l.bar/s", p2="l.bar/s"),
-      effects=[lambda s: leak(s, "p1", "p1", "hole", "a seal that opens"), lambda s: overflow(s, "p1", "p1", True), lambda s: overflow(s, "p2", "p2", True), lambda s: in_backlash(s, "u", True), lambda s: in_backlash(s, "u"), lambda s: in_delay(s, "u"), lambda s: in_saturation(s, "u"), lambda s: in_rate(s, "u"), lambda s: y_drift(s, "g1"), lambda s: y_saturation(s, "g1"), lambda s: y_scale(s, "g1"), lambda s: y_offset(s, "g2"),
-               lambda s: change(s, "k12", ["q12", "p1", "p2"], -1, "the throttle clogs", (), ["p1", "p2"]), lambda s: change(s, "k2", ["p2"], 1, "another consumer opens", (), ["p2"]), lambda s: load_step(s, "p2", -1, "a constant draw", ["leak"]), lambda s: missing(s, "Ta", "p1"), lambda s: law(s, "p2", "p2"), lambda s: law(s, "p1", "p1"), lambda s: in_curve(s, "u"), lambda s: y_lag(s, "g2"), lambda s: in_hysteresis(s, "u"), lambda s: cross(s, "u", "p2", "a by-pass"), lambda s: periodic(s, "p2")])
+      effects=[leak("p1", "p1", "hole", "a seal that opens"), overflow("p1", "p1", True), overflow("p2", "p2", True), in_backlash("u", True), in_backlash("u"), in_delay("u"), in_saturation("u"), in_rate("u"), y_drift("g1"), y_saturation("g1"), y_scale("g1"), y_offset("g2"),
+               change("k12", ["q12", "p1", "p2"], -1, "the throttle clogs", (), ["p1", "p2"]), change("k2", ["p2"], 1, "another consumer opens", (), ["p2"]), load_step("p2", -1, "a constant draw", ["leak"]), missing("Ta", "p1"), law("p2", "p2"), law("p1", "p1"), in_curve("u"), y_lag("g2"), in_hysteresis("u"), cross("u", "p2", "a by-pass"), periodic("p2")])
 
 plant("heat_exchanger", """
 model HeatExchanger "counterflow exchanger: hot water, wall, cold water"
@@ -905,9 +944,9 @@ equation
   yh = Th;
   yc = Tc;
 end HeatExchanger;
-""", dt=.5, tc=60, u=dict(mh=(.185, .05), mc=(.25, .06), Ta=(20, 5)), y=dict(yh=3, yc=2), scale=dict(Th=3, Tw=2, Tc=2), track=dict(mh="yc"), ry=1, lim=dict(mh=(.04, .5)), loop=.45, free=True, unit=dict(Th="W", Tw="W", Tc="W"),
-      effects=[lambda s: change(s, "UAh", ["Th", "Tw"], -1, "scale on the wall", (), ["Th", "Tw"], True), lambda s: change(s, "UAc", ["Tc", "Tw"], -1, "scale on the wall", (), ["Tc", "Tw"], False), lambda s: y_lag(s, "yc"), lambda s: y_offset(s, "yc"), lambda s: y_drift(s, "yh"), lambda s: y_scale(s, "yc"), lambda s: in_delay(s, "mh"), lambda s: in_lag(s, "mh"), lambda s: in_backlash(s, "mh", True), lambda s: in_backlash(s, "mh"),
-               lambda s: in_saturation(s, "mh"), lambda s: missing(s, "Ta", "Tw", "loss to the room", "Ta - Tw"), lambda s: load_step(s, "Tw"), lambda s: law(s, "Tw", "Tw"), lambda s: in_curve(s, "mh"), lambda s: convection(s, "Tw", "Tw", "Ta"), lambda s: in_rate(s, "mc"), lambda s: in_hysteresis(s, "mh"), lambda s: cross(s, "Th", "Tc", "a by-pass"), lambda s: periodic(s, "Tc")])
+""", dt=.5, tc=60, u=dict(mh=(.185, .05), mc=(.25, .06), Ta=(20, 5)), y=dict(yh=3, yc=2), scale=dict(Th=3, Tw=2, Tc=2), track=dict(mh="yc"), ry=1, lim=dict(mh=(.04, .5)), loop=.45, unit=dict(Th="W", Tw="W", Tc="W"),
+      effects=[change("UAh", ["Th", "Tw"], -1, "scale on the wall", (), ["Th", "Tw"], True), change("UAc", ["Tc", "Tw"], -1, "scale on the wall", (), ["Tc", "Tw"], False), y_lag("yc"), y_offset("yc"), y_drift("yh"), y_scale("yc"), in_delay("mh"), in_lag("mh"), in_backlash("mh", True), in_backlash("mh"),
+               in_saturation("mh"), missing("Ta", "Tw", "loss to the room", "Ta - Tw"), load_step("Tw"), law("Tw", "Tw"), in_curve("mh"), convection("Tw", "Tw", "Ta"), in_rate("mc"), in_hysteresis("mh"), cross("Th", "Tc", "a by-pass"), periodic("Tc")])
 
 plant("oven", """
 model Oven "electric chamber furnace"
@@ -929,9 +968,9 @@ equation
   Cin*der(Ti) = g2*(T - Ti) - g3*(Ti - Ta);
   y = T;
 end Oven;
-""", dt=15, tc=90, u=dict(P=(900, 350), Ta=(20, 3)), y=dict(y=80), scale=dict(Te=60, T=60, Ti=40), track=dict(P="y"), ry=1, offset=dict(y=450), lim=dict(P=(0, 3000)), loop=.6, free=True, unit=dict(Te="W", T="W", Ti="W"), soft=2,
-      effects=[lambda s: radiation(s, "Ti", "Ti", "Ta"), lambda s: radiation(s, "T", "T", "Ta"), lambda s: convection(s, "Ti", "Ti", "Ta"), lambda s: convection(s, "T", "T", "Ta"), lambda s: element(s, "P", "Te"), lambda s: in_saturation(s, "P"), lambda s: in_delay(s, "P"), lambda s: y_lag(s, "y"), lambda s: y_drift(s, "y"), lambda s: y_offset(s, "y"), lambda s: y_saturation(s, "y"),
-               lambda s: change(s, "g3", ["Ti"], 1, "the insulation gets wet", (), ["Ti", "Ta"]), lambda s: load_step(s, "T", -1, "the door is left ajar"), lambda s: law(s, "T", "T"), lambda s: law(s, "T", "T"), lambda s: in_rate(s, "P"), lambda s: in_hysteresis(s, "P"), lambda s: in_curve(s, "P"), lambda s: change(s, "g1", ["Te", "T"], -1, "coils fail", (), ["Te", "T"])])
+""", dt=15, tc=90, u=dict(P=(900, 350), Ta=(20, 3)), y=dict(y=80), scale=dict(Te=60, T=60, Ti=40), track=dict(P="y"), ry=1, offset=dict(y=450), lim=dict(P=(0, 3000)), loop=.6, unit=dict(Te="W", T="W", Ti="W"), soft=2,
+      effects=[radiation("Ti", "Ti", "Ta"), radiation("T", "T", "Ta"), convection("Ti", "Ti", "Ta"), convection("T", "T", "Ta"), element("P", "Te"), in_saturation("P"), in_delay("P"), y_lag("y"), y_drift("y"), y_offset("y"), y_saturation("y"),
+               change("g3", ["Ti"], 1, "the insulation gets wet", (), ["Ti", "Ta"]), load_step("T", -1, "the door is left ajar"), law("T", "T"), law("T", "T"), in_rate("P"), in_hysteresis("P"), in_curve("P"), change("g1", ["Te", "T"], -1, "coils fail", (), ["Te", "T"])])
 
 plant("buck", """
 model Buck "averaged step-down converter"
@@ -952,9 +991,9 @@ equation
   vo = v;
   il = i;
 end Buck;
-""", dt=2e-5, tc=70, u=dict(d=(.5225, .08), Vin=(24, 1), iL2=(0, .6)), y=dict(vo=2, il=.8), scale=dict(i=1, v=1.5), track=dict(d="vo"), ry=.8, lim=dict(d=(.02, .98)), loop=.45, free=True, unit=dict(i="V", v="A"), soft=3,
-      effects=[lambda s: warming(s, "R", "i", ["i"], .012), lambda s: in_saturation(s, "d"), lambda s: in_delay(s, "d"), lambda s: y_offset(s, "il"), lambda s: y_scale(s, "il"), lambda s: y_lag(s, "il"), lambda s: y_saturation(s, "il"), lambda s: load_step(s, "v", -1, "a consumer is switched on"), lambda s: change(s, "G", ["v"], 1, "another load", (), ["v"]), lambda s: change(s, "C", ["v"], -1, "the capacitor dries out", ()),
-               lambda s: missing(s, "iL2", "v", "the second consumer", "-iL2"), lambda s: law(s, "i", "i"), lambda s: law(s, "v", "v"), lambda s: drag(s, "i", "i"), lambda s: in_curve(s, "d"), lambda s: periodic(s, "i"), lambda s: in_lag(s, "d"), lambda s: y_drift(s, "vo"), lambda s: mode(s, "v", "v", "", "a filter at the load")])
+""", dt=2e-5, tc=70, u=dict(d=(.5225, .08), Vin=(24, 1), iL2=(0, .6)), y=dict(vo=2, il=.8), scale=dict(i=1, v=1.5), track=dict(d="vo"), ry=.8, lim=dict(d=(.02, .98)), loop=.45, unit=dict(i="V", v="A"), soft=3,
+      effects=[warming("R", "i", ["i"], .012), in_saturation("d"), in_delay("d"), y_offset("il"), y_scale("il"), y_lag("il"), y_saturation("il"), load_step("v", -1, "a consumer is switched on"), change("G", ["v"], 1, "another load", (), ["v"]), change("C", ["v"], -1, "the capacitor dries out", ()),
+               missing("iL2", "v", "the second consumer", "-iL2"), law("i", "i"), law("v", "v"), drag("i", "i"), in_curve("d"), periodic("i"), in_lag("d"), y_drift("vo"), mode("v", "v", "", "a filter at the load")])
 
 plant("crane", """
 model Crane "trolley with a hanging load"
@@ -980,9 +1019,9 @@ equation
   xt = x;
   sway = th;
 end Crane;
-""", dt=.05, tc=70, u=dict(u=(0, 1.5), vw=(0, 4)), y=dict(xt=1, sway=.05), scale=dict(x=1, v=.4, th=.05, w=.08), track=dict(u="xt"), ry=1.5, lim=dict(u=(-10, 10)), loop=.7, free=True, far=True, soft=2, places=dict(v=dict(v=1, u=1/50)), unit=dict(v="N", w="m/s2"),
-      effects=[lambda s: friction(s, "v", "v"), lambda s: friction(s, "v", "v", True), lambda s: in_dead_zone(s, "u"), lambda s: in_rate(s, "u"), lambda s: in_delay(s, "u"), lambda s: in_lag(s, "u"), lambda s: in_saturation(s, "u"), lambda s: missing(s, "vw", "w", "wind"), lambda s: drag(s, "w", "w"), lambda s: end_stop(s, "v", "x", "v", False), lambda s: y_offset(s, "sway"), lambda s: y_lag(s, "sway"), lambda s: y_scale(s, "sway"),
-               lambda s: cogging(s, "v", "x"), lambda s: change(s, "ml", ["v"], 1, "a load is hung on", (), ["th", "w"]), lambda s: change(s, "bt", ["v"], 1, "the rail rusts", (), ["v"]), lambda s: law(s, "v", "x"), lambda s: law(s, "v", "v", SHAPES[2]), lambda s: load_step(s, "v"), lambda s: in_backlash(s, "u"), lambda s: asymmetric(s, "v", "v")])
+""", dt=.05, tc=70, u=dict(u=(0, 1.5), vw=(0, 4)), y=dict(xt=1, sway=.05), scale=dict(x=1, v=.4, th=.05, w=.08), track=dict(u="xt"), ry=1.5, lim=dict(u=(-10, 10)), loop=.7, far=True, soft=2, places=dict(v=dict(v=1, u=1/50)), unit=dict(v="N", w="m/s2"),
+      effects=[friction("v", "v"), friction("v", "v", True), in_dead_zone("u"), in_rate("u"), in_delay("u"), in_lag("u"), in_saturation("u"), missing("vw", "w", "wind"), drag("w", "w"), end_stop("v", "x", "v", False), y_offset("sway"), y_lag("sway"), y_scale("sway"),
+               cogging("v", "x"), change("ml", ["v"], 1, "a load is hung on", (), ["th", "w"]), change("bt", ["v"], 1, "the rail rusts", (), ["v"]), law("v", "x"), law("v", "v", SHAPES[2]), load_step("v"), in_backlash("u"), asymmetric("v", "v")])
 
 plant("aircraft", """
 model Aircraft "short-period motion with the elevator's actuator"
@@ -1006,9 +1045,9 @@ equation
   al = alpha;
   qg = q;
 end Aircraft;
-""", dt=.02, tc=60, u=dict(de=(0, .04), wg=(0, .01)), y=dict(al=.06, qg=.12), scale=dict(alpha=.05, q=.1, d=.04), track=dict(de="al"), ry=1, lim=dict(de=(-.4, .4)), loop=.45, free=True, unit=dict(alpha="rad/s", q="rad/s2"), soft=3,
-      effects=[lambda s: stiffening(s, "q", "alpha"), lambda s: stiffening(s, "q", "alpha", 2), lambda s: law(s, "q", "alpha"), lambda s: law(s, "alpha", "alpha"), lambda s: in_rate(s, "de"), lambda s: in_backlash(s, "de"), lambda s: in_dead_zone(s, "de"), lambda s: in_delay(s, "de"), lambda s: in_saturation(s, "de"), lambda s: y_lag(s, "al"), lambda s: y_scale(s, "al"), lambda s: y_offset(s, "al"), lambda s: missing(s, "wg", "q", "gust", "Ma*wg"), lambda s: missing(s, "wg", "alpha", "gust"),
-               lambda s: change(s, "Md", ["q"], -1, "ice on the tail", (), ["d"]), lambda s: change(s, "Ma", ["q"], -1, "the centre of gravity moves", (), ["alpha"]), lambda s: drag(s, "q", "q"), lambda s: mode(s, "q", "q", "", "sloshing fuel"), lambda s: periodic(s, "q"), lambda s: load_step(s, "q"), lambda s: y_saturation(s, "qg"), lambda s: asymmetric(s, "q", "q")])
+""", dt=.02, tc=60, u=dict(de=(0, .04), wg=(0, .01)), y=dict(al=.06, qg=.12), scale=dict(alpha=.05, q=.1, d=.04), track=dict(de="al"), ry=1, lim=dict(de=(-.4, .4)), loop=.45, unit=dict(alpha="rad/s", q="rad/s2"), soft=3,
+      effects=[stiffening("q", "alpha"), stiffening("q", "alpha", 2), law("q", "alpha"), law("alpha", "alpha"), in_rate("de"), in_backlash("de"), in_dead_zone("de"), in_delay("de"), in_saturation("de"), y_lag("al"), y_scale("al"), y_offset("al"), missing("wg", "q", "gust", "Ma*wg"), missing("wg", "alpha", "gust"),
+               change("Md", ["q"], -1, "ice on the tail", (), ["d"]), change("Ma", ["q"], -1, "the centre of gravity moves", (), ["alpha"]), drag("q", "q"), mode("q", "q", "", "sloshing fuel"), periodic("q"), load_step("q"), y_saturation("qg"), asymmetric("q", "q")])
 
 plant("two_masses", """
 model TwoMasses "two masses on springs and dampers"
@@ -1037,10 +1076,10 @@ equation
   y1 = x1;
   y2 = x2;
 end TwoMasses;
-""", dt=.01, tc=50, u=dict(F=(0, 3), ab=(0, .6)), y=dict(y1=.015, y2=.02), scale=dict(x1=.01, v1=.1, x2=.02, v2=.1), track=dict(F="y2"), ry=1, lim=dict(F=(-20, 20)), loop=.35, free=True, soft=4,
+""", dt=.01, tc=50, u=dict(F=(0, 3), ab=(0, .6)), y=dict(y1=.015, y2=.02), scale=dict(x1=.01, v1=.1, x2=.02, v2=.1), track=dict(F="y2"), ry=1, lim=dict(F=(-20, 20)), loop=.35, soft=4,
       places=dict(Fc=dict(Fc=1, v1=-1, v2=1), v1=dict(v1=1, F=1)), unit=dict(v1="N", v2="N"),
-      effects=[lambda s: stiffening(s, "Fc", "dx"), lambda s: stiffening(s, "v1", "x1"), lambda s: stiffening(s, "v1", "x1", 2), lambda s: friction(s, "Fc", "dv"), lambda s: friction(s, "v1", "v1"), lambda s: friction(s, "v1", "v1", True), lambda s: end_stop(s, "v1", "x1", "v1"), lambda s: end_stop(s, "Fc", "dx", "dv"), lambda s: asymmetric(s, "Fc", "dv"), lambda s: drag(s, "v2", "v2"), lambda s: drag(s, "v1", "v1", 3), lambda s: mode(s, "v2", "v2", "x2", "a third mass"),
-               lambda s: missing(s, "ab", "v2", "the frame accelerates", "-m2*ab"), lambda s: change(s, "k1", ["v1"], -1, "the spring fatigues", (), ["x1"]), lambda s: change(s, "k2", ["Fc", "v1", "v2"], -1, "the spring fatigues", (), ["dx", "x1", "x2"]), lambda s: load_step(s, "v2"), lambda s: law(s, "Fc", "dx"), lambda s: law(s, "Fc", "dv", SHAPES[2]), lambda s: law(s, "v1", "x1"), lambda s: in_saturation(s, "F"), lambda s: in_delay(s, "F"), lambda s: in_lag(s, "F"), lambda s: y_scale(s, "y2"), lambda s: y_lag(s, "y2"), lambda s: y_saturation(s, "y1"), lambda s: periodic(s, "v1"), lambda s: in_hysteresis(s, "F")])
+      effects=[stiffening("Fc", "dx"), stiffening("v1", "x1"), stiffening("v1", "x1", 2), friction("Fc", "dv"), friction("v1", "v1"), friction("v1", "v1", True), end_stop("v1", "x1", "v1"), end_stop("Fc", "dx", "dv"), asymmetric("Fc", "dv"), drag("v2", "v2"), drag("v1", "v1", 3), mode("v2", "v2", "x2", "a third mass"),
+               missing("ab", "v2", "the frame accelerates", "-m2*ab"), change("k1", ["v1"], -1, "the spring fatigues", (), ["x1"]), change("k2", ["Fc", "v1", "v2"], -1, "the spring fatigues", (), ["dx", "x1", "x2"]), load_step("v2"), law("Fc", "dx"), law("Fc", "dv", SHAPES[2]), law("v1", "x1"), in_saturation("F"), in_delay("F"), in_lag("F"), y_scale("y2"), y_lag("y2"), y_saturation("y1"), periodic("v1"), in_hysteresis("F")])
 
 plant("cstr", """
 model Cstr "cooled stirred reactor, one exothermic reaction"
@@ -1063,10 +1102,10 @@ equation
   cm = c;
   Tm = T;
 end Cstr;
-""".replace("  cm = c;\n  Tm = T;", "  Tm = T;\n  cm = c;"), dt=.02, tc=60, u=dict(Tj=(300, 4), q=(100, 10), Ta=(295, 5)), y=dict(Tm=4, cm=.06), scale=dict(c=.05, T=3), track=dict(Tj="Tm"), ry=.8, lim=dict(Tj=(270, 340)), loop=.5, free=True, unit=dict(c="mol/min", T="K.l/min"),
+""".replace("  cm = c;\n  Tm = T;", "  Tm = T;\n  cm = c;"), dt=.02, tc=60, u=dict(Tj=(300, 4), q=(100, 10), Ta=(295, 5)), y=dict(Tm=4, cm=.06), scale=dict(c=.05, T=3), track=dict(Tj="Tm"), ry=.8, lim=dict(Tj=(270, 340)), loop=.5, unit=dict(c="mol/min", T="K.l/min"),
       places=dict(r=dict(r=1, c=-100, T=8000)),
-      effects=[lambda s: change(s, "UA", ["T"], -1, "scale on the jacket", (), ["T", "Tj"], True), lambda s: change(s, "k0", ["r", "c", "T"], -1, "the catalyst dies", (), ["T", "c"], True), lambda s: y_lag(s, "cm"), lambda s: y_lag(s, "Tm"), lambda s: y_drift(s, "cm"), lambda s: y_offset(s, "cm"), lambda s: y_scale(s, "cm"), lambda s: in_delay(s, "Tj"), lambda s: in_lag(s, "Tj"), lambda s: in_backlash(s, "q", True), lambda s: in_saturation(s, "Tj"), lambda s: missing(s, "Ta", "T", "loss to the hall", "Ta - T"),
-               lambda s: load_step(s, "T"), lambda s: law(s, "T", "T"), lambda s: law(s, "c", "c"), lambda s: in_hysteresis(s, "q"), lambda s: y_saturation(s, "Tm"), lambda s: periodic(s, "T"), lambda s: in_rate(s, "Tj")])
+      effects=[change("UA", ["T"], -1, "scale on the jacket", (), ["T", "Tj"], True), change("k0", ["r", "c", "T"], -1, "the catalyst dies", (), ["T", "c"], True), y_lag("cm"), y_lag("Tm"), y_drift("cm"), y_offset("cm"), y_scale("cm"), in_delay("Tj"), in_lag("Tj"), in_backlash("q", True), in_saturation("Tj"), missing("Ta", "T", "loss to the hall", "Ta - T"),
+               load_step("T"), law("T", "T"), law("c", "c"), in_hysteresis("q"), y_saturation("Tm"), periodic("T"), in_rate("Tj")])
 
 plant("bioreactor", """
 model Bioreactor "continuous culture"
@@ -1087,8 +1126,8 @@ equation
   Xm = X;
   Sm = S;
 end Bioreactor;
-""", dt=.1, tc=70, u=dict(D=(.18, .04), Sf=(11, 1.5)), y=dict(Xm=.5, Sm=.3), scale=dict(X=.4, S=.3), track=dict(D="Sm"), ry=.8, lim=dict(D=(.02, .3)), loop=.4, free=True, unit=dict(X="g/(l.h)", S="g/(l.h)"),
-      effects=[lambda s: y_lag(s, "Sm"), lambda s: y_drift(s, "Xm"), lambda s: y_scale(s, "Sm"), lambda s: y_offset(s, "Sm"), lambda s: y_saturation(s, "Xm"), lambda s: in_delay(s, "D"), lambda s: in_lag(s, "D"), lambda s: in_saturation(s, "D"), lambda s: in_backlash(s, "D"), lambda s: in_hysteresis(s, "D"), lambda s: change(s, "mumax", ["mu", "X", "S"], -1, "the culture tires", (), ["S"]), lambda s: change(s, "Yx", ["S"], -1, "a by-product", (), ["mu", "X"]), lambda s: load_step(s, "S"), lambda s: law(s, "mu", "S"), lambda s: law(s, "S", "S"), lambda s: in_rate(s, "D"), lambda s: periodic(s, "S"), lambda s: y_lag(s, "Xm"), lambda s: in_curve(s, "D")])
+""", dt=.1, tc=70, u=dict(D=(.18, .04), Sf=(11, 1.5)), y=dict(Xm=.5, Sm=.3), scale=dict(X=.4, S=.3), track=dict(D="Sm"), ry=.8, lim=dict(D=(.02, .3)), loop=.4, unit=dict(X="g/(l.h)", S="g/(l.h)"),
+      effects=[y_lag("Sm"), y_drift("Xm"), y_scale("Sm"), y_offset("Sm"), y_saturation("Xm"), in_delay("D"), in_lag("D"), in_saturation("D"), in_backlash("D"), in_hysteresis("D"), change("mumax", ["mu", "X", "S"], -1, "the culture tires", (), ["S"]), change("Yx", ["S"], -1, "a by-product", (), ["mu", "X"]), load_step("S"), law("mu", "S"), law("S", "S"), in_rate("D"), periodic("S"), y_lag("Xm"), in_curve("D")])
 
 plant("conveyor", """
 model Conveyor "belt conveyor with its load"
@@ -1114,9 +1153,9 @@ end Conveyor;
   Real M(unit="kg", start=160) "load on the belt";
 """, """  Real M(unit="kg", start=160) "load on the belt";
   Real v(unit="m/s", start=1.5) "belt speed";
-"""), dt=.2, tc=70, u=dict(u=(3.0, .45), feed=(12, 2.5), tilt=(0, .015)), y=dict(vb=.25, mb=30), scale=dict(M=20, v=.2), track=dict(u="vb"), ry=.8, lim=dict(u=(2.1, 8)), loop=.5, free=True, unit=dict(v="N", M="kg/s"),
-      effects=[lambda s: drag(s, "v", "v"), lambda s: drag(s, "v", "v", 3), lambda s: in_saturation(s, "u"), lambda s: in_delay(s, "feed"), lambda s: in_delay(s, "u"), lambda s: in_lag(s, "feed"), lambda s: y_lag(s, "mb"), lambda s: y_scale(s, "mb"), lambda s: y_offset(s, "mb"), lambda s: y_drift(s, "mb"), lambda s: load_step(s, "v", -1, "a scraper jams"), lambda s: missing(s, "tilt", "v", "gravity along the belt", "-(m0 + M)*Modelica.Constants.g_n*tilt"), lambda s: change(s, "cr", ["v"], 1, "wet material", ["load_step"], ["M"]), lambda s: change(s, "kT", ["v", "u"], -1, "the drive belt slips", ["load_step"]),
-               lambda s: law(s, "v", "v"), lambda s: law(s, "v", "M"), lambda s: in_hysteresis(s, "feed"), lambda s: in_backlash(s, "feed", True), lambda s: overflow(s, "M", "M"), lambda s: periodic(s, "v"), lambda s: y_saturation(s, "mb"), lambda s: in_rate(s, "u"), lambda s: in_curve(s, "u"), lambda s: in_lag(s, "u")])
+"""), dt=.2, tc=70, u=dict(u=(3.0, .45), feed=(12, 2.5), tilt=(0, .015)), y=dict(vb=.25, mb=30), scale=dict(M=20, v=.2), track=dict(u="vb"), ry=.8, lim=dict(u=(2.1, 8)), loop=.5, unit=dict(v="N", M="kg/s"),
+      effects=[drag("v", "v"), drag("v", "v", 3), in_saturation("u"), in_delay("feed"), in_delay("u"), in_lag("feed"), y_lag("mb"), y_scale("mb"), y_offset("mb"), y_drift("mb"), load_step("v", -1, "a scraper jams"), missing("tilt", "v", "gravity along the belt", "-(m0 + M)*Modelica.Constants.g_n*tilt"), change("cr", ["v"], 1, "wet material", ["load_step"], ["M"]), change("kT", ["v", "u"], -1, "the drive belt slips", ["load_step"]),
+               law("v", "v"), law("v", "M"), in_hysteresis("feed"), in_backlash("feed", True), overflow("M", "M"), periodic("v"), y_saturation("mb"), in_rate("u"), in_curve("u"), in_lag("u")])
 
 plant("quadrotor", """
 model Quadrotor "height of a multicopter"
@@ -1138,8 +1177,8 @@ equation
   h = z;
   az = der(v);
 end Quadrotor;
-""", dt=.02, tc=110, u=dict(u=(.4803, .06), vz=(0, .7)), y=dict(h=1, az=.8), scale=dict(F=1, v=.5, z=1), track=dict(u="h"), ry=1, lim=dict(u=(.05, 1)), loop=1, free=True, far=True, soft=2, places=dict(v=dict(v=1)), unit=dict(v="N", F="N"), dither=.4,
-      effects=[lambda s: law(s, "v", "z"), lambda s: drag(s, "v", "v"), lambda s: drag(s, "v", "v", 3), lambda s: change(s, "kT", ["F", "v", "u"], -1, "the battery sags", ["battery_sag", "load_step"]), lambda s: change(s, "m", ["v"], 1, "a payload", ["load_step"]), lambda s: load_step(s, "v", -1, "a tether"), lambda s: in_saturation(s, "u"), lambda s: in_delay(s, "u"), lambda s: y_lag(s, "h"), lambda s: y_scale(s, "az"), lambda s: y_offset(s, "az"), lambda s: y_drift(s, "h"), lambda s: missing(s, "vz", "v", "wind"), lambda s: asymmetric(s, "v", "v"), lambda s: periodic(s, "v"), lambda s: mode(s, "v", "v", "z", "a hanging camera"), lambda s: in_hysteresis(s, "u"), lambda s: y_saturation(s, "az"), lambda s: end_stop(s, "v", "z", "v", False)])
+""", dt=.02, tc=110, u=dict(u=(.4803, .06), vz=(0, .7)), y=dict(h=1, az=.8), scale=dict(F=1, v=.5, z=1), track=dict(u="h"), ry=1, lim=dict(u=(.05, 1)), loop=1, far=True, soft=2, places=dict(v=dict(v=1)), unit=dict(v="N", F="N"), dither=.4,
+      effects=[law("v", "z"), drag("v", "v"), drag("v", "v", 3), change("kT", ["F", "v", "u"], -1, "the battery sags", ["battery_sag", "load_step"]), change("m", ["v"], 1, "a payload", ["load_step"]), load_step("v", -1, "a tether"), in_saturation("u"), in_delay("u"), y_lag("h"), y_scale("az"), y_offset("az"), y_drift("h"), missing("vz", "v", "wind"), asymmetric("v", "v"), periodic("v"), mode("v", "v", "z", "a hanging camera"), in_hysteresis("u"), y_saturation("az"), end_stop("v", "z", "v", False)])
 
 plant("three_tanks", """
 model ThreeTanks "three tanks in a chain"
@@ -1167,10 +1206,10 @@ equation
   y2 = h2;
   y3 = h3;
 end ThreeTanks;
-""", dt=4, tc=70, u=dict(u1=(5.2, 1), u3=(3, .8), qr=(5e-6, 3e-6)), y=dict(y1=.06, y2=.05, y3=.04), scale=dict(h1=.05, h2=.05, h3=.04), track=dict(u1="y1", u3="y3"), ry=.8, lim=dict(u1=(0, 12), u3=(0, 12)), loop=.5, free=True, unit=dict(h1="m3/s", h2="m3/s", h3="m3/s"),
+""", dt=4, tc=70, u=dict(u1=(5.2, 1), u3=(3, .8), qr=(5e-6, 3e-6)), y=dict(y1=.06, y2=.05, y3=.04), scale=dict(h1=.05, h2=.05, h3=.04), track=dict(u1="y1", u3="y3"), ry=.8, lim=dict(u1=(0, 12), u3=(0, 12)), loop=.5, unit=dict(h1="m3/s", h2="m3/s", h3="m3/s"),
       places=dict(q12=dict(q12=1, h1=-1, h2=1), q23=dict(q23=1, h2=-1, h3=1)),
-      effects=[lambda s: leak(s, "h2", "h2", "sqrt", "a hole"), lambda s: leak(s, "h1", "h1", "hole", "a hole above the bottom"), lambda s: overflow(s, "h1", "h1"), lambda s: overflow(s, "h2", "h2"), lambda s: in_backlash(s, "u1", True), lambda s: in_backlash(s, "u3"), lambda s: in_delay(s, "u3"), lambda s: in_saturation(s, "u1"), lambda s: missing(s, "qr", "h2", "rain"), lambda s: cross(s, "u1", "h3", "the first pump's branch"), lambda s: cross(s, "u3", "h1", "the second pump's branch"),
-               lambda s: change(s, "a12", ["q12", "h1", "h2"], -1, "the pipe clogs", (), ["h1", "h2"]), lambda s: change(s, "a23", ["q23", "h2", "h3"], -1, "the pipe clogs", (), ["h2", "h3"]), lambda s: y_offset(s, "y2"), lambda s: y_scale(s, "y1"), lambda s: y_drift(s, "y2"), lambda s: y_lag(s, "y2"), lambda s: y_saturation(s, "y1"), lambda s: law(s, "h1", "h1"), lambda s: law(s, "h3", "h3"), lambda s: in_hysteresis(s, "u1"), lambda s: load_step(s, "h2", -1, "a tap is opened", ["leak", "tank_outflow"])])
+      effects=[leak("h2", "h2", "sqrt", "a hole"), leak("h1", "h1", "hole", "a hole above the bottom"), overflow("h1", "h1"), overflow("h2", "h2"), in_backlash("u1", True), in_backlash("u3"), in_delay("u3"), in_saturation("u1"), missing("qr", "h2", "rain"), cross("u1", "h3", "the first pump's branch"), cross("u3", "h1", "the second pump's branch"),
+               change("a12", ["q12", "h1", "h2"], -1, "the pipe clogs", (), ["h1", "h2"]), change("a23", ["q23", "h2", "h3"], -1, "the pipe clogs", (), ["h2", "h3"]), y_offset("y2"), y_scale("y1"), y_drift("y2"), y_lag("y2"), y_saturation("y1"), law("h1", "h1"), law("h3", "h3"), in_hysteresis("u1"), load_step("h2", -1, "a tap is opened", ["leak", "tank_outflow"])])
 
 plant("robot_joint", """
 model RobotJoint "arm behind an elastic gear"
@@ -1198,8 +1237,8 @@ equation
   qm = pm;
   qa = pa;
 end RobotJoint;
-""", dt=.008, tc=90, u=dict(i=(0, 1.2)), y=dict(qm=.4, qa=.4), scale=dict(pm=.3, wm=1, pa=.3, wa=1), track=dict(i="qa"), ry=1.2, lim=dict(i=(-8, 8)), loop=.6, free=True, places=dict(Tg=dict(Tg=1, wm=-1, wa=1)), unit=dict(wm="N.m", wa="N.m"), soft=2,
-      effects=[lambda s: friction(s, "wm", "wm"), lambda s: friction(s, "wm", "wm", True), lambda s: friction(s, "wa", "wa"), lambda s: play(s, "Tg", "tw", "k", "play in the gear"), lambda s: cogging(s, "wm", "pm"), lambda s: stiffening(s, "Tg", "tw"), lambda s: end_stop(s, "wa", "pa", "wa"), lambda s: change(s, "G", ["wa"], 1, "a tool is taken up", (), ["pa"]), lambda s: load_step(s, "wa"), lambda s: in_dead_zone(s, "i"), lambda s: in_delay(s, "i"), lambda s: in_saturation(s, "i"), lambda s: in_lag(s, "i"), lambda s: law(s, "wa", "pa"), lambda s: law(s, "wm", "wm", SHAPES[2]), lambda s: y_scale(s, "qa"), lambda s: y_offset(s, "qa"), lambda s: y_lag(s, "qa"), lambda s: drag(s, "wm", "wm"), lambda s: asymmetric(s, "wm", "wm"), lambda s: periodic(s, "wm"), lambda s: mode(s, "wa", "wa", "pa", "a limp load"), lambda s: in_hysteresis(s, "i"), lambda s: stiffening(s, "wa", "pa", 2)])
+""", dt=.008, tc=90, u=dict(i=(0, 1.2)), y=dict(qm=.4, qa=.4), scale=dict(pm=.3, wm=1, pa=.3, wa=1), track=dict(i="qa"), ry=1.2, lim=dict(i=(-8, 8)), loop=.6, places=dict(Tg=dict(Tg=1, wm=-1, wa=1)), unit=dict(wm="N.m", wa="N.m"), soft=2,
+      effects=[friction("wm", "wm"), friction("wm", "wm", True), friction("wa", "wa"), play("Tg", "tw", "k", "play in the gear"), cogging("wm", "pm"), stiffening("Tg", "tw"), end_stop("wa", "pa", "wa"), change("G", ["wa"], 1, "a tool is taken up", (), ["pa"]), load_step("wa"), in_dead_zone("i"), in_delay("i"), in_saturation("i"), in_lag("i"), law("wa", "pa"), law("wm", "wm", SHAPES[2]), y_scale("qa"), y_offset("qa"), y_lag("qa"), drag("wm", "wm"), asymmetric("wm", "wm"), periodic("wm"), mode("wa", "wa", "pa", "a limp load"), in_hysteresis("i"), stiffening("wa", "pa", 2)])
 
 plant("building", """
 model Building "room of a building"
@@ -1225,8 +1264,8 @@ equation
   Tr = Ti;
   Tf = Tl;
 end Building;
-""", dt=300, tc=50, u=dict(Q=(1.6, .7), To=(4, 4), sol=(.25, .18)), y=dict(Tr=1.5, Tf=8), scale=dict(Tl=8, Ti=1.5, Tw=1), track=dict(Q="Tr"), ry=.8, lim=dict(Q=(0, 6)), loop=.5, free=True, unit=dict(Ti="kW", Tw="kW", Tl="kW"), soft=2,
-      effects=[lambda s: missing(s, "sol", "Ti", "sun through the windows"), lambda s: missing(s, "sol", "Tw", "sun on the wall"), lambda s: convection(s, "Tl", "Tl", "Ti"), lambda s: radiation(s, "Tw", "Tw", "To"), lambda s: change(s, "Hv", ["Ti"], 1, "a window is opened", (), ["Ti", "To"]), lambda s: load_step(s, "Ti", 1, "people come in"), lambda s: in_delay(s, "Q"), lambda s: in_lag(s, "Q"), lambda s: in_saturation(s, "Q"), lambda s: in_backlash(s, "Q", True), lambda s: y_lag(s, "Tr"), lambda s: y_offset(s, "Tr"), lambda s: y_drift(s, "Tr"), lambda s: y_scale(s, "Tf"), lambda s: periodic(s, "Ti"), lambda s: law(s, "Tl", "Tl"), lambda s: law(s, "Ti", "Ti"), lambda s: in_hysteresis(s, "Q"), lambda s: in_curve(s, "Q"), lambda s: in_rate(s, "Q")])
+""", dt=300, tc=50, u=dict(Q=(1.6, .7), To=(4, 4), sol=(.25, .18)), y=dict(Tr=1.5, Tf=8), scale=dict(Tl=8, Ti=1.5, Tw=1), track=dict(Q="Tr"), ry=.8, lim=dict(Q=(0, 6)), loop=.5, unit=dict(Ti="kW", Tw="kW", Tl="kW"), soft=2,
+      effects=[missing("sol", "Ti", "sun through the windows"), missing("sol", "Tw", "sun on the wall"), convection("Tl", "Tl", "Ti"), radiation("Tw", "Tw", "To"), change("Hv", ["Ti"], 1, "a window is opened", (), ["Ti", "To"]), load_step("Ti", 1, "people come in"), in_delay("Q"), in_lag("Q"), in_saturation("Q"), in_backlash("Q", True), y_lag("Tr"), y_offset("Tr"), y_drift("Tr"), y_scale("Tf"), periodic("Ti"), law("Tl", "Tl"), law("Ti", "Ti"), in_hysteresis("Q"), in_curve("Q"), in_rate("Q")])
 
 plant("cell_cooling", """
 model CellCooling "cell on a cold plate"
@@ -1249,8 +1288,8 @@ equation
   T1 = Tc;
   T2 = Tp;
 end CellCooling;
-""".replace('unit="J/l"', 'unit="J/(l.K)"'), dt=2, tc=110, u=dict(mf=(.003, .001), I=(90, 40), Tin=(19, 1), Ta=(32, 3)), y=dict(T1=3, T2=1), scale=dict(Tc=3, Tp=1), track=dict(mf="T2"), ry=.6, lim=dict(mf=(.0003, .02)), loop=.35, free=True, unit=dict(Tc="W", Tp="W"), soft=2,
-      effects=[lambda s: missing(s, "Ta", "Tc", "heat from the surroundings", "Ta - Tc"), lambda s: convection(s, "Tc", "Tc", "Ta"), lambda s: radiation(s, "Tc", "Tc", "Ta"), lambda s: load_step(s, "Tc", 1, "an internal short"), lambda s: change(s, "g", ["Tc", "Tp"], -1, "the paste dries", (), ["Tc", "Tp"]), lambda s: change(s, "R", ["Tc"], 1, "the cell ages", (), ["I"]), lambda s: y_lag(s, "T1"), lambda s: y_offset(s, "T1"), lambda s: y_drift(s, "T1"), lambda s: y_scale(s, "T1"), lambda s: in_delay(s, "mf"), lambda s: in_backlash(s, "mf", True), lambda s: in_saturation(s, "mf"), lambda s: law(s, "Tc", "Tc"), lambda s: law(s, "Tc", "I"), lambda s: in_lag(s, "Tin"), lambda s: cross(s, "I", "Tp", "cables on the plate"), lambda s: in_hysteresis(s, "mf"), lambda s: y_saturation(s, "T1")])
+""".replace('unit="J/l"', 'unit="J/(l.K)"'), dt=2, tc=110, u=dict(mf=(.003, .001), I=(90, 40), Tin=(19, 1), Ta=(32, 3)), y=dict(T1=3, T2=1), scale=dict(Tc=3, Tp=1), track=dict(mf="T2"), ry=.6, lim=dict(mf=(.0003, .02)), loop=.35, unit=dict(Tc="W", Tp="W"), soft=2,
+      effects=[missing("Ta", "Tc", "heat from the surroundings", "Ta - Tc"), convection("Tc", "Tc", "Ta"), radiation("Tc", "Tc", "Ta"), load_step("Tc", 1, "an internal short"), change("g", ["Tc", "Tp"], -1, "the paste dries", (), ["Tc", "Tp"]), change("R", ["Tc"], 1, "the cell ages", (), ["I"]), y_lag("T1"), y_offset("T1"), y_drift("T1"), y_scale("T1"), in_delay("mf"), in_backlash("mf", True), in_saturation("mf"), law("Tc", "Tc"), law("Tc", "I"), in_lag("Tin"), cross("I", "Tp", "cables on the plate"), in_hysteresis("mf"), y_saturation("T1")])
 
 plant("auv", """
 model Auv "underwater vehicle, ahead"
@@ -1271,8 +1310,8 @@ equation
   um = u;
   nm = n;
 end Auv;
-""", dt=.1, tc=60, u=dict(nc=(0, 11), cur=(0, .2)), y=dict(um=.5, nm=8), scale=dict(u=.4, n=8), track=dict(nc="um"), ry=1, lim=dict(nc=(-30, 30)), loop=.35, free=True, unit=dict(u="N", n="1/s"), start=dict(n=4.0, u=.1),
-      effects=[lambda s: in_dead_zone(s, "nc"), lambda s: in_saturation(s, "nc"), lambda s: in_rate(s, "nc"), lambda s: in_delay(s, "nc"), lambda s: drag(s, "u", "u", 3), lambda s: missing(s, "cur", "u", "the current", "Xuu*cur*abs(cur) + Xu*cur"), lambda s: load_step(s, "u", -1, "a cable drags"), lambda s: change(s, "Xuu", ["u"], 1, "growth on the hull", (), ["u"], True), lambda s: change(s, "kn", ["u"], -1, "weed in the propeller", (), ["n"], False), lambda s: law(s, "u", "u"), lambda s: law(s, "u", "n"), lambda s: asymmetric(s, "u", "u"), lambda s: y_lag(s, "um"), lambda s: y_offset(s, "um"), lambda s: y_scale(s, "um"), lambda s: y_saturation(s, "um"), lambda s: cross(s, "u", "n", "the stream turns the propeller"), lambda s: mode(s, "u", "u", "", "a towed body"), lambda s: in_hysteresis(s, "nc"), lambda s: periodic(s, "u"), lambda s: in_curve(s, "nc")])
+""", dt=.1, tc=60, u=dict(nc=(0, 11), cur=(0, .2)), y=dict(um=.5, nm=8), scale=dict(u=.4, n=8), track=dict(nc="um"), ry=1, lim=dict(nc=(-30, 30)), loop=.35, unit=dict(u="N", n="1/s"), start=dict(n=4.0, u=.1),
+      effects=[in_dead_zone("nc"), in_saturation("nc"), in_rate("nc"), in_delay("nc"), drag("u", "u", 3), missing("cur", "u", "the current", "Xuu*cur*abs(cur) + Xu*cur"), load_step("u", -1, "a cable drags"), change("Xuu", ["u"], 1, "growth on the hull", (), ["u"], True), change("kn", ["u"], -1, "weed in the propeller", (), ["n"], False), law("u", "u"), law("u", "n"), asymmetric("u", "u"), y_lag("um"), y_offset("um"), y_scale("um"), y_saturation("um"), cross("u", "n", "the stream turns the propeller"), mode("u", "u", "", "a towed body"), in_hysteresis("nc"), periodic("u"), in_curve("nc")])
 
 plant("wind_turbine", """
 model WindTurbine "rotor, shaft and generator of a wind turbine"
@@ -1295,8 +1334,8 @@ equation
   om = w;
   Pe = M*w;
 end WindTurbine;
-""", dt=.2, tc=60, u=dict(Mc=(38, 10), pit=(3, 1.5), vw=(11, 1)), y=dict(om=.3, Pe=20), scale=dict(w=.3, M=10), track=dict(Mc="om"), ry=1, lim=dict(Mc=(0, 120)), loop=.5, free=True, places=dict(w=dict(w=1, Ma=1), M=dict(M=1)), unit=dict(w="kN.m", M="kN.m"),
-      effects=[lambda s: drag(s, "w", "w", 3), lambda s: drag(s, "w", "w"), lambda s: load_step(s, "w", -1, "a brake rubs"), lambda s: change(s, "ka", ["w", "Ma"], -1, "ice on the blades", (), ["vw"]), lambda s: change(s, "kp", ["w", "Ma"], -1, "a pitch drive fails", (), ["pit"]), lambda s: periodic(s, "w"), lambda s: mode(s, "w", "w", "", "the tower sways"), lambda s: in_rate(s, "Mc"), lambda s: in_delay(s, "Mc"), lambda s: in_saturation(s, "Mc"), lambda s: in_backlash(s, "pit"), lambda s: in_lag(s, "pit"), lambda s: in_backlash(s, "pit", True), lambda s: y_lag(s, "om"), lambda s: y_scale(s, "Pe"), lambda s: y_offset(s, "Pe"), lambda s: law(s, "w", "w"), lambda s: in_curve(s, "pit"), lambda s: in_lag(s, "vw"), lambda s: y_saturation(s, "Pe"), lambda s: in_hysteresis(s, "pit")])
+""", dt=.2, tc=60, u=dict(Mc=(38, 10), pit=(3, 1.5), vw=(11, 1)), y=dict(om=.3, Pe=20), scale=dict(w=.3, M=10), track=dict(Mc="om"), ry=1, lim=dict(Mc=(0, 120)), loop=.5, places=dict(w=dict(w=1, Ma=1), M=dict(M=1)), unit=dict(w="kN.m", M="kN.m"),
+      effects=[drag("w", "w", 3), drag("w", "w"), load_step("w", -1, "a brake rubs"), change("ka", ["w", "Ma"], -1, "ice on the blades", (), ["vw"]), change("kp", ["w", "Ma"], -1, "a pitch drive fails", (), ["pit"]), periodic("w"), mode("w", "w", "", "the tower sways"), in_rate("Mc"), in_delay("Mc"), in_saturation("Mc"), in_backlash("pit"), in_lag("pit"), in_backlash("pit", True), y_lag("om"), y_scale("Pe"), y_offset("Pe"), law("w", "w"), in_curve("pit"), in_lag("vw"), y_saturation("Pe"), in_hysteresis("pit")])
 
 plant("servo_valve", """
 model ServoValve "spool of a solenoid valve"
@@ -1320,8 +1359,8 @@ equation
   xs = 1000*x;
   im = i;
 end ServoValve;
-""", dt=.0005, tc=60, u=dict(u=(0, 2), dp=(80, 20)), y=dict(xs=1, im=.6), scale=dict(i=.5, x=.001, v=.1), track=dict(u="xs"), ry=1, lim=dict(u=(-12, 12)), loop=.45, free=True, unit=dict(i="V", v="N"), soft=3,
-      effects=[lambda s: friction(s, "v", "v"), lambda s: friction(s, "v", "v", True), lambda s: end_stop(s, "v", "x", "v"), lambda s: stiffening(s, "v", "x"), lambda s: stiffening(s, "v", "x", 2), lambda s: in_hysteresis(s, "u"), lambda s: in_dead_zone(s, "u"), lambda s: warming(s, "R", "i", ["i"], .25), lambda s: in_delay(s, "u"), lambda s: in_saturation(s, "u"), lambda s: missing(s, "dp", "v", "flow force", "-dp"), lambda s: law(s, "v", "x"), lambda s: law(s, "i", "i"), lambda s: drag(s, "v", "v"), lambda s: asymmetric(s, "v", "v"), lambda s: change(s, "k", ["v"], -1, "the spring sets", (), ["x"]), lambda s: load_step(s, "v"), lambda s: y_scale(s, "im"), lambda s: y_lag(s, "xs"), lambda s: y_saturation(s, "xs"), lambda s: y_offset(s, "xs"), lambda s: periodic(s, "v"), lambda s: cross(s, "v", "i", "the moving iron's voltage")])
+""", dt=.0005, tc=60, u=dict(u=(0, 2), dp=(80, 20)), y=dict(xs=1, im=.6), scale=dict(i=.5, x=.001, v=.1), track=dict(u="xs"), ry=1, lim=dict(u=(-12, 12)), loop=.45, unit=dict(i="V", v="N"), soft=3,
+      effects=[friction("v", "v"), friction("v", "v", True), end_stop("v", "x", "v"), stiffening("v", "x"), stiffening("v", "x", 2), in_hysteresis("u"), in_dead_zone("u"), warming("R", "i", ["i"], .25), in_delay("u"), in_saturation("u"), missing("dp", "v", "flow force", "-dp"), law("v", "x"), law("i", "i"), drag("v", "v"), asymmetric("v", "v"), change("k", ["v"], -1, "the spring sets", (), ["x"]), load_step("v"), y_scale("im"), y_lag("xs"), y_saturation("xs"), y_offset("xs"), periodic("v"), cross("v", "i", "the moving iron's voltage")])
 
 
 # ---------------------------------------------------------------- drawing a case
@@ -1502,8 +1541,8 @@ def draw(cls, kind, rng, counts, tried, verbose=False):
     if kind == "single" and effects[0].add and effects[0].id in RIVALS:
         e = effects[0]; h = next(iter(e.add)); series = lambda e: np.std(term(e, h, Z, dict(zip(model.params, p)))); variable = e.depends[0]
         for other in RIVALS[e.id]:
-            x = {"quadratic_drag": lambda: drag(scene, h, variable), "cubic_drag": lambda: drag(scene, h, variable, 3), "asymmetric_damping": lambda: asymmetric(scene, h, variable), "cubic_stiffness": lambda: stiffening(scene, h, variable), "quadratic_stiffness": lambda: stiffening(scene, h, variable, 2),
-                 "radiation": lambda: radiation(scene, h, variable, e.depends[-1]), "natural_convection": lambda: convection(scene, h, variable, e.depends[-1])}[other]()(1.0)
+            x = {"quadratic_drag": drag(h, variable), "cubic_drag": drag(h, variable, 3), "asymmetric_damping": asymmetric(h, variable), "cubic_stiffness": stiffening(h, variable), "quadratic_stiffness": stiffening(h, variable, 2),
+                 "radiation": radiation(h, variable, e.depends[-1]), "natural_convection": convection(h, variable, e.depends[-1])}[other](scene)(1.0)
             x = inner(x, spec); x.q[x.knob] = (x.q[x.knob][0]*series(e)/max(series(x), 1e-300), x.q[x.knob][1]); rivals[other] = float(rms(fitted([x])))
             if r.size*math.log(rivals[other]/best) < 10: e.accept = e.accept + [other]            # they cannot be told apart
     if rivals: over["rivals"] = rivals

@@ -7,7 +7,7 @@
 //!
 //! | request | who estimates |
 //! |---|---|
-//! | a model from recordings | `identify::memory` |
+//! | a model from recordings | `identify::data::memory_need` |
 //! | a recording held in memory | `log::Log`, as it is read |
 //! | what a simulation leaves out | `explain::memory` |
 

@@ -9,7 +9,7 @@
 //! |---|---|
 //! | `job` | one log: its model from before, or a new one |
 //! | `row` | what is said of it |
-//! | `summary` | all rows as CSV |
+//! | `summary_csv` | all rows as CSV |
 //!
 //! ```no_run
 //! use innovant::batch::{Batch, run, summary_csv};
@@ -22,7 +22,7 @@
 
 mod job;
 mod row;
-mod summary;
+mod summary_csv;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -35,7 +35,7 @@ use crate::limits::{LimitError, memory_limit};
 use crate::log::Roles;
 
 pub use row::{Row, Status};
-pub use summary::summary_csv;
+pub use summary_csv::summary_csv;
 
 /// How many logs are to be identified.
 #[derive(Debug, Clone, Default)]

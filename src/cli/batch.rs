@@ -4,10 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::model_flags::ModelFlags;
-use super::output::{check_distinct, note, print};
-use super::progress::Progress;
-use super::roles::RoleFlags;
+use super::flags::{ModelFlags, RoleFlags};
+use super::terminal::{Progress, check_distinct, note, print};
 use super::{Outcome, Verbosity};
 use crate::batch::{Batch, Row, Status, run as run_batch, summary_csv};
 use crate::log::{Source, write_file_atomically};

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::output::print;
 use super::plant::{load, tell_warnings};
+use super::terminal::print;
 use super::{Outcome, Verbosity};
 use crate::report::text::plant_text;
 

@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::align::aligned;
-use super::output::{Output, check_distinct, note, paths, print};
-use super::plant::{is_plant_file, load, read_recordings, tell_warnings};
-use super::roles::{RoleFlags, tell_reading};
-use super::structure::HoldFlag;
+use super::flags::{RoleFlags, tell_reading};
+use super::plant::{HoldFlag, is_plant_file, load, read_recordings, tell_warnings};
+use super::terminal::{Output, check_distinct, note, paths, print};
 use super::{Outcome, Verbosity};
 use crate::explain::{
     Explanation, Hypothesis, Options, PlantOptions, Simulation, Verdict, explain, explain_plant,

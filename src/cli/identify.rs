@@ -5,13 +5,10 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::model_flags::ModelFlags;
-use super::output::{Output, check_distinct, note, paths, print};
-use super::progress::Progress;
-use super::roles::{RoleFlags, tell_reading};
-use super::simulator::{self, SimulatorFlags};
-use super::structure::{self, StructureFlags};
-use super::terminal::style;
+use super::flags::{ModelFlags, RoleFlags, tell_reading};
+use super::plant::{StructureFlags, identify_plant};
+use super::simulator::{SimulatorFlags, identify_simulator};
+use super::terminal::{Output, Progress, check_distinct, note, paths, print, style};
 use super::{Outcome, Verbosity};
 use crate::identify::{IdentifyError, Model, Options, Order, on_files};
 use crate::log::{Roles, Source};
@@ -90,7 +87,7 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         if flags.report.is_some() {
             anyhow::bail!("--report draws linear models; leave it out with --simulator");
         }
-        return simulator::run(
+        return identify_simulator::run(
             &flags.simulator,
             &flags.plant,
             &flags.logs,
@@ -100,7 +97,7 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         );
     }
     if flags.plant.asked() {
-        return structure::run(
+        return identify_plant::run(
             &flags.plant,
             &flags.logs,
             &flags.roles,

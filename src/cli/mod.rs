@@ -1,4 +1,5 @@
-//! The command line: one file a subcommand.
+//! The command line: one file a subcommand; those that only print what the program knows stand in `reference`, those of
+//! plants in equations in `plant`, external simulators in `simulator`.
 //!
 //! Flags are parsed by clap into one type and then checked into a second, which says what to do without any
 //! further question (as ripgrep does). Exit codes: 0 done, 1 the model was rejected, 2 an error, with one
@@ -8,27 +9,16 @@
 mod align;
 mod batch;
 mod check;
-mod completions;
-mod effects;
 mod explain;
+mod flags;
 mod identify;
-mod model_flags;
-mod numbers;
-mod output;
 mod plant;
-mod progress;
+mod reference;
 mod reproduce;
-mod resources;
-mod roles;
-mod schema;
+mod response_csv;
 mod show;
-mod show_plant;
 mod simulate;
-mod simulate_plant;
 mod simulator;
-mod simulator_command;
-mod simulator_parameters;
-mod structure;
 mod terminal;
 mod validate;
 
@@ -39,7 +29,7 @@ use std::process::ExitCode;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::log::LogError;
-use resources::Resources;
+use flags::Resources;
 
 /// What is said above the list of commands.
 const ABOUT: &str = "State-space models with uncertainty from recordings, in open or closed loop";
@@ -84,14 +74,14 @@ enum Command {
     Identify(identify::Flags),
     Batch(batch::Flags),
     Explain(explain::Flags),
-    Effects(effects::Flags),
+    Effects(reference::effects::Flags),
     Validate(validate::Flags),
     Simulate(simulate::Flags),
     Check(check::Flags),
     Show(show::Flags),
     Reproduce(reproduce::Flags),
-    Schema(schema::Flags),
-    Completions(completions::Flags),
+    Schema(reference::schema::Flags),
+    Completions(reference::completions::Flags),
 }
 
 /// How a command ended, if not in an error.
@@ -121,7 +111,7 @@ where
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             // The messages of the library hold their causes already.
-            output::note(&format!("error: {error}\n"));
+            terminal::note(&format!("error: {error}\n"));
             ExitCode::from(2)
         }
     }
@@ -132,20 +122,20 @@ fn dispatch(cli: Cli) -> anyhow::Result<Outcome> {
     cli.resources.apply()?;
     match cli.command {
         None => {
-            output::print(&command().render_help().to_string())?;
+            terminal::print(&command().render_help().to_string())?;
             Ok(Outcome::Done)
         }
         Some(Command::Identify(flags)) => identify::run(flags, say),
         Some(Command::Batch(flags)) => batch::run(flags, say),
         Some(Command::Explain(flags)) => explain::run(flags, say),
-        Some(Command::Effects(flags)) => effects::run(&flags),
+        Some(Command::Effects(flags)) => reference::effects::run(&flags),
         Some(Command::Validate(flags)) => validate::run(flags, say),
         Some(Command::Simulate(flags)) => simulate::run(flags, say),
         Some(Command::Check(flags)) => check::run(&flags, say),
         Some(Command::Show(flags)) => show::run(flags, say),
         Some(Command::Reproduce(flags)) => reproduce::run(flags, say),
-        Some(Command::Schema(flags)) => schema::run(&flags),
-        Some(Command::Completions(flags)) => completions::run(&flags),
+        Some(Command::Schema(flags)) => reference::schema::run(&flags),
+        Some(Command::Completions(flags)) => reference::completions::run(&flags),
     }
 }
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::output::{Output, note, print};
+use super::terminal::{Output, note, print};
 use super::{Outcome, Verbosity};
 use crate::report::text::reproduction_text;
 use crate::report::{reproduction_csv, reproduction_page, to_json};

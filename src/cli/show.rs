@@ -2,15 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
-use super::numbers;
-use super::output::print;
-use super::plant::is_plant_file;
-use super::show_plant::{self, PlantShowFlags};
-use super::terminal::style;
+use super::flags::{ShowFormat, numbers};
+use super::plant::{PlantShowFlags, is_plant_file, show_plant};
+use super::response_csv::response_csv;
+use super::terminal::{print, style};
 use super::{Outcome, Verbosity};
-use crate::covariance::{ResponsePoint, invariants};
+use crate::covariance::invariants;
 use crate::identify::{Model, channel_names};
 use crate::report::text::show_text;
 use crate::report::{read_model, to_json};
@@ -40,7 +39,7 @@ pub(super) struct Flags {
     /// text: tables; json: everything (for a plant in equations: its linearisation); csv: the frequency response; modelica:
     /// the equations with the estimated values
     #[arg(long, value_enum, default_value = "text")]
-    format: Format,
+    format: ShowFormat,
     /// Frequencies in rad/s [default: a logarithmic grid up to Nyquist]
     #[arg(
         long,
@@ -54,20 +53,12 @@ pub(super) struct Flags {
     plant: PlantShowFlags,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Format {
-    Text,
-    Json,
-    Csv,
-    Modelica,
-}
-
 pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     if is_plant_file(&flags.model) {
         return show_plant::run(&flags.model, &flags.plant, &flags.at, flags.format, say);
     }
     let name = flags.model.display();
-    if flags.plant.given() || flags.format == Format::Modelica {
+    if flags.plant.given() || flags.format == ShowFormat::Modelica {
         anyhow::bail!(
             "{name}: --state, --input, --along and --format modelica belong to a plant in equations, and this is none"
         );
@@ -84,17 +75,17 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         model.summary.as_ref().map_or(0, |s| s.options.seed),
     )?;
     match flags.format {
-        Format::Text => print(&show_text(
+        ShowFormat::Text => print(&show_text(
             model,
             &described,
             read.document.residual_tests(),
             !flags.at.is_empty(),
             style(),
         ))?,
-        Format::Json => print(&to_json(&described)?)?,
+        ShowFormat::Json => print(&to_json(&described)?)?,
         // Refused above.
-        Format::Modelica => {}
-        Format::Csv => print(&table(
+        ShowFormat::Modelica => {}
+        ShowFormat::Csv => print(&response_csv(
             described
                 .frequency_response
                 .iter()
@@ -116,57 +107,4 @@ fn frequencies(asked: &[f64], model: &Model) -> anyhow::Result<Vec<f64>> {
         );
     }
     Ok(asked.to_vec())
-}
-
-/// Frequency responses as CSV; the innovation of output y is the input `e(y)`.
-pub(super) fn table<'a>(points: impl Iterator<Item = &'a ResponsePoint>) -> anyhow::Result<String> {
-    let mut csv = csv::Writer::from_writer(Vec::new());
-    csv.write_record([
-        "rad_s",
-        "hz",
-        "output",
-        "input",
-        "real",
-        "imag",
-        "variance_real",
-        "covariance_real_imag",
-        "variance_imag",
-        "magnitude",
-        "magnitude_95_low",
-        "magnitude_95_high",
-        "magnitude_99_low",
-        "magnitude_99_high",
-        "phase_rad",
-        "phase_95_low",
-        "phase_95_high",
-    ])?;
-    for point in points {
-        csv.write_record(record(point))?;
-    }
-    Ok(String::from_utf8(csv.into_inner()?)?)
-}
-
-fn record(point: &ResponsePoint) -> [String; 17] {
-    let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
-    let end = |band: Option<[f64; 2]>, end: usize| number(band.map(|b| b[end]));
-    let covariance = |i: usize, j: usize| number(point.covariance.map(|c| c[i][j]));
-    [
-        point.rad_s.to_string(),
-        point.hz.to_string(),
-        point.output.clone(),
-        point.input.clone(),
-        number(point.real),
-        number(point.imag),
-        covariance(0, 0),
-        covariance(0, 1),
-        covariance(1, 1),
-        number(point.magnitude),
-        end(point.magnitude_95, 0),
-        end(point.magnitude_95, 1),
-        end(point.magnitude_99, 0),
-        end(point.magnitude_99, 1),
-        number(point.phase_rad),
-        end(point.phase_95, 0),
-        end(point.phase_95, 1),
-    ]
 }

@@ -5,11 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use nalgebra::DVector;
 
-use super::output::{Output, check_distinct, note, paths};
-use super::plant::is_plant_file;
-use super::roles::{RoleFlags, tell_reading};
-use super::simulate_plant::{self, PlantRun, Start};
-use super::structure::HoldFlag;
+use super::flags::{RoleFlags, tell_reading};
+use super::plant::{HoldFlag, PlantRun, Start, is_plant_file, simulate_plant};
+use super::terminal::{Output, check_distinct, note, paths};
 use super::validate::check_sampling;
 use super::{Outcome, Verbosity};
 use crate::explain::Explanation;

@@ -4,11 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::numbers;
-use super::output::{check_distinct, print};
-use super::plant::{is_plant_file, load, read_recordings};
-use super::roles::{RoleFlags, tell_reading};
-use super::terminal::style;
+use super::flags::{RoleFlags, numbers, tell_reading};
+use super::plant::{all_known, is_plant_file, load, read_recordings};
+use super::terminal::{check_distinct, print, style};
 use super::{Outcome, Verbosity};
 use crate::identify::{Model, Recording};
 use crate::log::{Log, Reading, RoleNeed, Source, check_same_sampling};
@@ -206,13 +204,4 @@ fn relation(model: &Model, logs: &[Log]) -> Relation {
     } else {
         Relation::Fresh
     }
-}
-
-/// Whether every log is one of the recordings, by its SHA-256.
-pub(super) fn all_known(recordings: &[Recording], logs: &[Log]) -> bool {
-    logs.iter().all(|log| {
-        recordings
-            .iter()
-            .any(|r| r.sha256.is_some() && r.sha256 == log.sha256)
-    })
 }

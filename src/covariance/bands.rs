@@ -7,12 +7,12 @@ use num_complex::Complex64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::covariance_error::CovarianceError;
+use super::delta_method::{
+    Covariance2, Path, longest_axis, path_covariance, pole_uncertainties, projected_variance,
+};
 use super::draws::ResponseDraws;
-use super::error::CovarianceError;
-use super::frequency_response::{Path, path_covariance};
-use super::gradient::{Covariance2, longest_axis, projected_variance};
 use super::parameters::ParameterCovariance;
-use super::poles::pole_uncertainties;
 use super::quantile::{ellipse_quantile, interval_quantile};
 use crate::model::StateSpace;
 
@@ -240,11 +240,11 @@ fn quantile(sorted: &[f64], p: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::covariance::draws::draw_parameters;
-    use crate::covariance::fixtures;
+    use crate::covariance::test_covariances;
 
     #[test]
     fn linear_bands_cover_what_draws_give() {
-        let (system, covariance) = fixtures::two_by_three(true);
+        let (system, covariance) = test_covariances::two_by_three(true);
         let w = [0.3, 1.5, 4.0];
         for path in [Path::Input, Path::Innovation] {
             let bands = response_bands(&system, &covariance, &w, path, 1).unwrap();
@@ -274,7 +274,7 @@ mod tests {
 
     #[test]
     fn both_methods_agree_where_the_linearisation_holds() {
-        let (system, covariance) = fixtures::oscillator();
+        let (system, covariance) = test_covariances::oscillator();
         let w = 8.0;
         let linear = response_bands(&system, &covariance, &[w], Path::Input, 1).unwrap()[0][0];
         let draws = ResponseDraws::new(&system, &covariance, 4000, 5).unwrap();
@@ -294,7 +294,7 @@ mod tests {
 
     #[test]
     fn a_pole_near_the_circle_and_a_response_near_zero_use_draws() {
-        let (mut system, covariance) = fixtures::oscillator();
+        let (mut system, covariance) = test_covariances::oscillator();
         // A pole on the unit circle at 0.4 rad, known to about 1e-3.
         let (sin, cos) = 0.4_f64.sin_cos();
         system.a = nalgebra::dmatrix![cos, sin; -sin, cos] * 0.9995;
@@ -304,7 +304,7 @@ mod tests {
         assert_eq!(found[1][0].method, BandMethod::Linear);
         assert!(found[0][0].magnitude_95[1] > found[0][0].magnitude_95[0]);
 
-        let (mut weak, covariance) = fixtures::oscillator();
+        let (mut weak, covariance) = test_covariances::oscillator();
         weak.b *= 1e-9;
         let band = response_bands(&weak, &covariance, &[3.0], Path::Input, 1).unwrap()[0][0];
         assert_eq!(band.method, BandMethod::Draws);
@@ -314,7 +314,7 @@ mod tests {
 
     #[test]
     fn bands_are_the_same_for_the_same_seed() {
-        let (mut system, covariance) = fixtures::oscillator();
+        let (mut system, covariance) = test_covariances::oscillator();
         system.b *= 1e-9;
         let run = |seed| response_bands(&system, &covariance, &[1.0], Path::Input, seed).unwrap();
         assert_eq!(run(3), run(3));
@@ -323,7 +323,7 @@ mod tests {
 
     #[test]
     fn few_degrees_of_freedom_widen_the_band() {
-        let (system, mut covariance) = fixtures::oscillator();
+        let (system, mut covariance) = test_covariances::oscillator();
         let width = |c: &ParameterCovariance| {
             let b = response_bands(&system, c, &[8.0], Path::Input, 1).unwrap()[0][0];
             (b.magnitude_95[1] / b.magnitude_95[0]).ln()

@@ -7,8 +7,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{ChiSquared, Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::error::CovarianceError;
-use super::frequency_response::Path;
+use super::covariance_error::CovarianceError;
+use super::delta_method::Path;
 use super::parameters::{ParameterCovariance, ParameterLayout};
 use crate::linalg::{eigen, multiply, multiply_tn, svd_thin, symmetric_square_root_factor};
 use crate::model::StateSpace;
@@ -198,12 +198,12 @@ impl ResponseDraws {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::covariance::fixtures;
-    use crate::covariance::frequency_response::path_covariance;
+    use crate::covariance::delta_method::path_covariance;
+    use crate::covariance::test_covariances;
 
     #[test]
     fn same_seed_same_draws_whatever_the_threads() {
-        let (system, covariance) = fixtures::two_by_three(false);
+        let (system, covariance) = test_covariances::two_by_three(false);
         let run = |threads: usize| {
             rayon::ThreadPoolBuilder::new()
                 .num_threads(threads)
@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn modal_responses_equal_direct_ones() {
-        let (system, covariance) = fixtures::two_by_three(true);
+        let (system, covariance) = test_covariances::two_by_three(true);
         let draws = ResponseDraws::new(&system, &covariance, 5, 1).unwrap();
         let systems = draw_parameters(&system, &covariance, 5, 1).unwrap();
         for path in [Path::Input, Path::Innovation] {
@@ -234,7 +234,7 @@ mod tests {
 
     #[test]
     fn a_step_along_the_tangent_leaves_the_responses_alone() {
-        let (system, covariance) = fixtures::two_by_three(true);
+        let (system, covariance) = test_covariances::two_by_three(true);
         let layout = covariance.layout;
         let tangent = basis_tangent(&system, &layout);
         let theta = layout.pack(&system);
@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn spread_of_the_draws_is_the_linear_covariance() {
-        let (system, mut covariance) = fixtures::two_by_three(true);
+        let (system, mut covariance) = test_covariances::two_by_three(true);
         for nu in [None, Some(12.0)] {
             covariance.degrees_of_freedom = nu;
             let expected = path_covariance(&system, &covariance, 1.0, Path::Input).unwrap();

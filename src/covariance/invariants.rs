@@ -6,15 +6,14 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::bands::{ResponseBand, response_bands};
-use super::document::{Invariants, ResponsePoint, Root, StaticGain, StepResponse};
-use super::error::CovarianceError;
-use super::frequency_response::Path;
-use super::gradient::Covariance2;
+use super::covariance_error::CovarianceError;
+use super::delta_method::{
+    Covariance2, Path, PoleUncertainty, pole_uncertainties, static_gain_std, step_response_std_at,
+    zero_uncertainties,
+};
+use super::invariants_document::{Invariants, ResponsePoint, Root, StaticGain, StepResponse};
 use super::parameters::ParameterCovariance;
-use super::poles::{PoleUncertainty, pole_uncertainties};
 use super::quantile::interval_quantile;
-use super::response::{static_gain_std, step_response_std_at};
-use super::zeros::zero_uncertainties;
 use crate::model::{Pole, StateSpace};
 
 /// Points of a step response in the document, and the longest one in samples (the sensitivity is carried
@@ -243,7 +242,7 @@ fn step_response(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::covariance::fixtures;
+    use crate::covariance::test_covariances;
     use nalgebra::dmatrix;
 
     fn names(letter: &str, count: usize) -> Vec<String> {
@@ -266,7 +265,7 @@ mod tests {
     /// The interval lies about the gain, as wide as its deviation and Student's quantile say.
     #[test]
     fn static_gains_have_intervals() {
-        let (system, covariance) = fixtures::two_by_three(true);
+        let (system, covariance) = test_covariances::two_by_three(true);
         let quantile = interval_quantile(0.95, covariance.degrees_of_freedom);
         assert!(quantile > 1.9);
         let gain = system.static_gain().unwrap();
@@ -282,7 +281,7 @@ mod tests {
 
     #[test]
     fn every_channel_at_every_frequency() {
-        let (system, covariance) = fixtures::two_by_three(true);
+        let (system, covariance) = test_covariances::two_by_three(true);
         let found = all(&system, Some(&covariance), &[0.5, 2.0]);
         assert_eq!(found.poles.len(), 3);
         assert_eq!(found.frequency_response.len(), 2 * 6);
@@ -305,7 +304,7 @@ mod tests {
 
     #[test]
     fn without_covariance_the_uncertainties_are_null() {
-        let (mut system, _) = fixtures::oscillator();
+        let (mut system, _) = test_covariances::oscillator();
         system.k.fill(0.0);
         let found = all(&system, None, &[1.0]);
         assert!(found.armax.is_some());
@@ -319,7 +318,7 @@ mod tests {
 
     #[test]
     fn key_names_are_those_of_the_design() {
-        let (system, covariance) = fixtures::oscillator();
+        let (system, covariance) = test_covariances::oscillator();
         let json = serde_json::to_value(all(&system, Some(&covariance), &[1.0])).unwrap();
         for key in [
             "real",
@@ -355,7 +354,7 @@ mod tests {
 
     #[test]
     fn hard_models_give_documents_too() {
-        let (mut system, covariance) = fixtures::oscillator();
+        let (mut system, covariance) = test_covariances::oscillator();
         // An integrator asked at zero frequency, a double pole, an unstable one, a delay.
         for a in [
             dmatrix![1.0, 0.0; 0.0, 0.5],
@@ -373,7 +372,7 @@ mod tests {
 
     #[test]
     fn static_models_and_models_without_input() {
-        let (gain, covariance) = fixtures::static_gain(1e-4);
+        let (gain, covariance) = test_covariances::static_gain(1e-4);
         let found = all(&gain, None, &[0.1]);
         assert_eq!(found.static_gain[0].value, Some(2.0));
         let found = all(&gain, Some(&covariance), &[0.1]);
@@ -405,7 +404,7 @@ mod tests {
 
     #[test]
     fn one_name_per_channel() {
-        let (system, _) = fixtures::oscillator();
+        let (system, _) = test_covariances::oscillator();
         let error = invariants(&system, None, &[], &names("u", 1), &[], 1).unwrap_err();
         assert_eq!(error.to_string(), "0 output names were given for 1 outputs");
     }

@@ -9,49 +9,43 @@
 //! |---|---|
 //! | `parameters` | [`ParameterCovariance`] and the order of the parameters |
 //! | `jackknife` | the covariance from blocks of the data, for any method |
-//! | `gradient` | the one form that all gradients have |
-//! | `frequency_response`, `poles`, `zeros`, `response` | uncertainty of each invariant |
+//! | `delta_method` | gradients, and the uncertainty of each invariant that follows from them |
 //! | `quantile` | from standard deviations to intervals, from covariances to ellipses |
 //! | `bands` | confidence bands of magnitude and phase |
 //! | `draws` | models drawn from the covariance |
-//! | `document`, `invariants` | all of it for a JSON document |
+//! | `invariants_document`, `invariants` | all of it for a JSON document |
 //! | `residual_budget` | how much of a record the effect on residuals is averaged over |
-//! | `error` | [`CovarianceError`] |
+//! | `covariance_error` | [`CovarianceError`] |
 
 mod bands;
-mod document;
+mod covariance_error;
+mod delta_method;
 mod draws;
-mod error;
-#[cfg(test)]
-mod fixtures;
-mod frequency_response;
-mod gradient;
 mod invariants;
+mod invariants_document;
 mod jackknife;
 mod parameters;
-mod poles;
 mod quantile;
 mod residual_budget;
-mod response;
-mod zeros;
+#[cfg(test)]
+mod test_covariances;
 
 pub(crate) use bands::linear_band;
 pub use bands::{
     BandMethod, DRAWS, LARGEST_RELATIVE_STD, ResponseBand, SMALLEST_POLE_DISTANCE, response_bands,
 };
-pub use document::{Invariants, ResponsePoint, Root, StaticGain, StepResponse};
+pub use covariance_error::CovarianceError;
+pub use delta_method::{
+    Covariance2, Path, PoleUncertainty, frequency_response_covariance, impulse_response_std,
+    noise_response_covariance, pole_uncertainties, static_gain_std, step_response_std,
+    zero_uncertainties,
+};
+pub(crate) use delta_method::{DEFECTIVE, continuous_stds, projected_variance};
 pub use draws::draw_parameters;
-pub use error::CovarianceError;
-pub use frequency_response::{Path, frequency_response_covariance, noise_response_covariance};
-pub use gradient::Covariance2;
-pub(crate) use gradient::projected_variance;
 pub use invariants::invariants;
 pub(crate) use invariants::response_point;
+pub use invariants_document::{Invariants, ResponsePoint, Root, StaticGain, StepResponse};
 pub use jackknife::jackknife_covariance;
 pub use parameters::{ParameterCovariance, ParameterLayout};
-pub(crate) use poles::{DEFECTIVE, continuous_stds};
-pub use poles::{PoleUncertainty, pole_uncertainties};
 pub use quantile::{ellipse_quantile, interval_quantile};
 pub(crate) use residual_budget::{MOST_LAGS, numbers_of_tests, samples_followed};
-pub use response::{impulse_response_std, static_gain_std, step_response_std};
-pub use zeros::zero_uncertainties;

@@ -5,7 +5,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::horizon;
-use super::pbsid_opt::Weight;
+use super::subspace::Weight;
 
 /// The smallest past window that is chosen automatically for Knudsen's method. The paper finds that a larger one than `n + 2` performs
 /// poorly; with the future window kept at `n / l + 2` the opposite was measured: the rms of the noise parameters falls

@@ -1,98 +1,68 @@
 //! From recordings to a model: windows, order, estimate, polish.
 //!
-//! [`identify()`] does it all. Its steps, each in a file of its own:
+//! [`identify()`] does it all. Its steps:
 //!
-//! | file | step | source |
+//! | folder or file | step | source |
 //! |---|---|---|
-//! | `records`, `delay`, `data` | recordings, streamed once, aligned, as moments | |
 //! | `options`, `algorithms` | what the user may choose | |
-//! | `fit`, `aligned` | all of it, with and without a search for dead time | |
-//! | `dead_time` | inputs that do nothing for some samples | |
-//! | `reduced` | recordings of which only moments are left: pieces of a cluster's work | |
-//! | `lags`, `horizon` | windows that are asked for; past window by Akaike's criterion, future window | |
-//! | `varx` | the high-order vector ARX model | van Wingerden (22)-(23) |
+//! | `data` | recordings, streamed once, aligned, as moments | |
+//! | `fit_recordings`, `fit_aligned` | all of it, with and without a search for dead time | |
+//! | `horizon` | past window by Akaike's criterion, future window | |
+//! | `subspace` | high-order vector ARX model, states, system matrices, truncation | van Wingerden; Chiuso & Picci; Qin & Ljung |
 //! | `method` | which algorithm: one enum variant and one module each | |
-//! | `pbsid_opt` | states by a weighted singular value decomposition, system matrices by least squares | van Wingerden (24)-(34) |
 //! | `variance` | the covariance of an estimate in closed form | van Wingerden (35)-(41); Chiuso & Picci (3.1)-(3.5) |
 //! | `stochastic` | `K` and `Lambda` by a step of its own, for any deterministic part | |
-//! | `weighted` | the singular value decomposition that states are taken from | van Wingerden (28)-(29) |
-//! | `nested` | states from nested regressions, growing past | Chiuso & Picci; Qin & Ljung |
 //! | `knudsen` | regression of future outputs on past and future inputs; tk, tk-chol | Knudsen |
 //! | `pem` | the prediction error method in the time domain | Ljung |
 //! | `baselines` | subid, an n4sid, the methods of Knudsen's table 2 | van Overschee & De Moor; Ljung |
-//! | `order`, `select` | which order: singular values propose, a chi-square test referees | Bauer 2001 |
-//! | `free_run` | the order of a plant that is not linear: by free runs on blocks held out | Breiman et al. 1984 |
-//! | `truncation` | what the past window cuts off | |
+//! | `order` | how many states: proposed, tested, chosen; dead time of the inputs | Bauer 2001; Breiman et al. 1984 |
 //! | `polish` | the maximum-likelihood model of that order | Soderstrom, Stoica & Friedlander 1991 |
 //! | `stable` | a stable model, guaranteed | |
-//! | `resolution` | what the steps of a recording do to the estimate | |
-//! | `finish`, `scaling`, `warnings` | covariance, the user's units, what to know before trusting it | |
-//! | `model`, `simulate`, `summary` | the result | |
+//! | `result` | covariance, the user's units, summary, what to know before trusting it | |
+//! | `identified_model`, `simulate_recording` | the model that is delivered | |
 //!
 //! Conventions: `x[k+1] = A x[k] + B u[k] + K e[k]`, `y[k] = C x[k] + D u[k] + e[k]`; `r` inputs, `l` outputs,
 //! `n` states, `z = [u; y]`, `q = r + l`; past window `p`, future window `f <= p`, `Nc = N - p` windows.
 
 mod algorithms;
-mod aligned;
 pub mod baselines;
-mod candidate;
 mod data;
-mod dead_time;
-mod delay;
-mod error;
-mod finish;
-mod fit;
-mod free_run;
+mod fit_aligned;
+mod fit_recordings;
 mod horizon;
+mod identified_model;
+mod identify_error;
 pub mod knudsen;
-mod lags;
-mod memory;
 pub mod method;
-mod model;
-mod nested;
 mod options;
 mod order;
-mod pbsid_opt;
 pub mod pem;
 mod polish;
-mod records;
-mod reduced;
-mod resolution;
-mod scaling;
-mod select;
-mod simulate;
-mod source;
+mod result;
+mod simulate_recording;
 mod stable;
 pub mod stochastic;
-mod summary;
-mod truncation;
+mod subspace;
 pub mod variance;
-mod varx;
-mod warnings;
-mod weighted;
 
 pub use algorithms::{Method, Stochastic};
-pub use delay::{AlignedColumns, Aligner};
-pub use error::IdentifyError;
-pub use finish::Fit;
-pub use fit::fit;
-pub(crate) use model::channel_names;
-pub use model::{IdentifiedChannel, Model, identify, identify_records};
-pub use nested::{
-    Nested, NestedDecomposition, Prediction, decompose_nested, nested_system_matrices,
+pub use data::{
+    AlignedColumns, Aligner, FileRecords, MemoryRecords, ReadProgress, Recording, Records,
+    ReducedRecords, SAMPLES_KEPT, Source, on_files,
 };
+pub use fit_recordings::fit;
+pub(crate) use identified_model::channel_names;
+pub use identified_model::{IdentifiedChannel, Model, identify, identify_records};
+pub use identify_error::IdentifyError;
 pub use options::{CovarianceKind, Options, Order, Polish};
-pub use order::OrderEvidence;
-pub use pbsid_opt::{Decomposition, Estimate, Weight, decompose, system_matrices};
+pub use order::{FreeRunRest, OrderEvidence};
 pub use polish::{Effort, Polished, coefficient_cost, polish, predictor_coefficients};
-pub use records::{FileRecords, MemoryRecords, ReadProgress, Recording, Records, on_files};
-pub use reduced::{ReducedRecords, SAMPLES_KEPT};
-pub use resolution::CoarseChannel;
-pub use source::Source;
-pub use summary::{
-    Asked, Diagnostics, FreeRunRest, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
+pub use result::{
+    Asked, CoarseChannel, Diagnostics, Fit, Horizons, OrderTest, PastEvidence, StabilityCost,
+    Summary, of_closed_loop as warnings_of_closed_loop,
+};
+pub use subspace::{
+    Decomposition, Estimate, Nested, NestedDecomposition, Prediction, Varx, Weight, WeightedSvd,
+    decompose, decompose_nested, nested_system_matrices, system_matrices, varx,
 };
 pub use variance::Propagation;
-pub use varx::{Varx, varx};
-pub use warnings::of_closed_loop as warnings_of_closed_loop;
-pub use weighted::WeightedSvd;

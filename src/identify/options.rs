@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::algorithms::{Method, Stochastic};
-use super::error::IdentifyError;
-use super::pbsid_opt::Weight;
+use super::identify_error::IdentifyError;
+use super::subspace::Weight;
 use crate::moments::Detrend;
 
 /// Blocks of the delete-block jackknife: enough degrees of freedom for its quantiles, few enough that

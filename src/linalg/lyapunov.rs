@@ -2,9 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::eigen::{eigen, spectral_radius};
-use super::error::LinalgError;
-use super::qr::qr_thin;
+use super::factorisation::{eigen, qr_thin, spectral_radius};
+use super::linalg_error::LinalgError;
 
 /// Solves `P = A P A' + Q` for a stable `A` by squared Smith iteration (Smith 1968): `P` after `k`
 /// steps holds the first `2^k` terms of `sum A^i Q A'^i`.

@@ -8,45 +8,33 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `product` | matrix products |
-//! | `triangular` | solves with, and the condition of, a triangular factor |
-//! | `cholesky` | upper triangular factor of a Gram matrix |
-//! | `qr` | orthogonal factorisation and least squares |
+//! | `factorisation` | Cholesky, QR and least squares, singular values, eigenvalues, solves with a triangular factor |
 //! | `rows` | a matrix in a document, as an array of rows |
-//! | `singular` | thin singular value decomposition, pseudo-inverse |
-//! | `eigen` | ordinary, symmetric and generalised eigenvalue problems |
 //! | `finite` | whether numbers are numbers |
 //! | `logarithm` | logarithm and exponential of small matrices |
 //! | `lyapunov` | discrete Lyapunov equation, stabilising observer gain |
 //! | `riccati` | stationary Kalman filter |
 
-mod cholesky;
-mod eigen;
-mod error;
 mod exchange;
+mod factorisation;
 mod finite;
+mod linalg_error;
 mod logarithm;
 mod lyapunov;
 mod product;
-mod qr;
 mod riccati;
 mod rows;
-mod singular;
-mod triangular;
 
-pub use cholesky::{cholesky_upper, symmetric_square_root_factor};
-pub use eigen::{
-    Eigen, SymmetricEigen, eigen, eigenvalues, generalised_eigenvalues, spectral_radius,
-    symmetric_eigen,
+pub use factorisation::{
+    Eigen, Svd, SymmetricEigen, cholesky_upper, eigen, eigenvalues, generalised_eigenvalues,
+    least_squares, pseudo_inverse, qr_r, qr_thin, reciprocal_condition_upper, solve_upper,
+    solve_upper_right, solve_upper_transposed, spectral_radius, svd_thin, symmetric_eigen,
+    symmetric_square_root_factor,
 };
-pub use error::LinalgError;
 pub use finite::all_finite;
+pub use linalg_error::LinalgError;
 pub use logarithm::{exponential, logarithm};
 pub use lyapunov::{discrete_lyapunov, stabilising_observer_gain};
 pub use product::{multiply, multiply_nt, multiply_tn};
-pub use qr::{least_squares, qr_r, qr_thin};
 pub use riccati::{StationaryFilter, stationary_filter};
 pub use rows::Rows;
-pub use singular::{Svd, pseudo_inverse, svd_thin};
-pub use triangular::{
-    reciprocal_condition_upper, solve_upper, solve_upper_right, solve_upper_transposed,
-};

@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::error::LinalgError;
 use super::finite::all_finite;
+use super::linalg_error::LinalgError;
 
 /// Doubling steps after which the iteration has failed: `2^60` steps of the filter have no more to say.
 const DOUBLINGS: usize = 60;

@@ -4,30 +4,17 @@
 //! *stream* of column-major blocks ([`LogReader`]), in memory that does not grow with the file, while the sampling is
 //! checked and the bytes are hashed; [`Log::read`] collects the blocks of a record which fits in memory.
 //!
-//! | file          | one idea                                                        |
-//! |---------------|-----------------------------------------------------------------|
-//! | `source`      | where bytes come from: file, standard input, gzip; SHA-256      |
-//! | `lines`       | bytes to whole lines in a bounded buffer                        |
-//! | `header`      | the first line: separator, names, units                         |
-//! | `roles`       | which column is input, output, time                             |
-//! | `decimal`     | text to the nearest `f64`, fast                                 |
-//! | `parse`       | rows to columns                                                 |
-//! | `sampling`    | is the time base uniform, and what is its step                  |
-//! | `reader`      | the five above, put together as a stream of blocks              |
-//! | `record`      | a whole record in memory                                        |
-//! | `reading`     | a file however it is written: plain, or by the rows below       |
-//! | `encoding`    | UTF-8, UTF-16, Windows-1252                                     |
-//! | `layout`      | separator, preamble, header, row of units                       |
-//! | `cells`       | numbers in many ways, words for missing values                  |
-//! | `whole`       | a text as a table of numbers                                    |
-//! | `stamp`, `stamps` | a date; a time column                                       |
-//! | `clock`       | time stamps to a grid, repaired                                 |
-//! | `repair`      | stamps that are coarse, repeated or out of order                |
-//! | `fill`        | missing samples: bridged, or the recording is cut               |
-//! | `resample`    | another rate                                                    |
-//! | `unit`        | is this a unit                                                  |
-//! | `lattice`     | was a signal recorded in steps                                  |
-//! | `writer`      | columns to CSV; `atomic`: a file appears whole or not at all    |
+//! | folder or file | one idea                                                       |
+//! |----------------|----------------------------------------------------------------|
+//! | `text`         | bytes to cells: encoding, lines, header, fields to numbers     |
+//! | `roles`        | which column is input, output, time                            |
+//! | `time`         | time stamps to a uniform grid: checked, repaired, resampled    |
+//! | `read`         | the plain form as a stream of blocks; any other form as a whole |
+//! | `reading`      | a file however it is written, by one of these                  |
+//! | `record`       | a whole record in memory                                       |
+//! | `data_frame`   | columns of another language's table in memory                  |
+//! | `quantisation` | was a signal recorded in steps                                 |
+//! | `write`        | columns to CSV; a file appears whole or not at all             |
 //!
 //! # What is accepted
 //! The plain form is streamed: UTF-8 text (a byte order mark is skipped), lines ended by LF or CRLF, a separator `,`, `;`
@@ -51,48 +38,30 @@
 //! # Ok::<(), innovant::log::LogError>(())
 //! ```
 
-mod atomic;
-mod cells;
-mod channel;
-mod clock;
-mod decimal;
-mod encoding;
-mod error;
-mod fill;
-mod header;
-mod lattice;
-mod layout;
-mod lines;
-mod parse;
-mod reader;
+mod data_frame;
+mod log_error;
+mod quantisation;
+mod read;
 mod reading;
 mod record;
-mod repair;
-mod resample;
 mod roles;
-mod sampling;
-mod source;
-mod stamp;
-mod stamps;
-mod table;
+mod sample_time;
 #[cfg(test)]
 mod tests;
-mod unit;
-mod whole;
-mod writer;
+mod text;
+mod time;
+mod write;
 
-pub use atomic::write_file_atomically;
-pub use channel::Channel;
-pub use error::LogError;
-pub use lattice::spacing;
-pub use reader::{
+pub use data_frame::{TableRoles, time_base_of};
+pub use log_error::LogError;
+pub use quantisation::spacing;
+pub use read::{
     BLOCK_ROWS, Block, LogReader, LogSummary, check_same_channels, check_same_sampling,
 };
 pub use reading::Reading;
 pub use record::{LARGEST_SIZE, Log};
 pub use roles::{Missing, RoleNeed, Roles, TimeUnit};
-pub use sampling::is_sample_time;
-pub use source::Source;
-pub use stamps::Origin;
-pub use table::{TableRoles, time_base_of};
-pub use writer::{CsvWriter, write_table};
+pub use sample_time::is_sample_time;
+pub use text::{Channel, Source};
+pub use time::Origin;
+pub use write::{CsvWriter, write_file_atomically, write_table};

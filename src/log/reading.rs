@@ -3,17 +3,15 @@
 
 use std::io::{Cursor, Read};
 
-use super::clock::{self, Piece, Rows, counted};
-use super::error::LogError;
-use super::fill::{Filled, SHORTEST, Tally, fill};
-use super::reader::LogReader;
+use super::log_error::LogError;
+use super::read::{LogReader, Whole, whole};
 use super::record::Log;
-use super::resample::Resampling;
 use super::roles::{Missing, RoleNeed, Roles};
-use super::sampling::readable;
-use super::source::{Source, Stream};
-use super::stamps::{Origin, check_sample_time};
-use super::whole::{self, Whole};
+use super::text::{Source, Stream};
+use super::time::{
+    Filled, Origin, Piece, Resampling, Rows, SHORTEST, Tally, check_sample_time, counted, fill,
+    readable, time_grid,
+};
 use crate::limits;
 
 /// What of a file is held in memory at once, in its size: bytes, text, rows and columns.
@@ -30,6 +28,36 @@ pub struct Reading {
     pub origin: Option<Origin>,
     /// What was recognised and repaired, on one line; nothing of a plain file.
     pub said: Option<String>,
+}
+
+impl Log {
+    /// Reads a recording with at least one input and one output; [`Reading`] has what was recognised and repaired.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the file: see [`LogError`]; also that it is in several parts.
+    pub fn read(source: &Source, roles: &Roles) -> Result<Self, LogError> {
+        Self::read_with(source, roles, RoleNeed::Identify)
+    }
+
+    /// As [`Log::read`], with other roles needed.
+    ///
+    /// # Errors
+    /// As [`Log::read`].
+    pub fn read_with(source: &Source, roles: &Roles, need: RoleNeed) -> Result<Self, LogError> {
+        Reading::read(source, roles, need)?.whole()
+    }
+
+    /// As [`Log::read`], of bytes in memory; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As [`Log::read`].
+    pub fn from_reader(
+        name: &str,
+        reader: impl Read + Send + 'static,
+        roles: &Roles,
+    ) -> Result<Self, LogError> {
+        Reading::from_reader(name, reader, roles, RoleNeed::Identify)?.whole()
+    }
 }
 
 impl Reading {
@@ -122,7 +150,7 @@ impl Reading {
     ) -> Result<Self, LogError> {
         if let Some(sample_time) = roles
             .resample
-            .filter(|step| !super::sampling::is_sample_time(*step))
+            .filter(|step| !super::sample_time::is_sample_time(*step))
         {
             return Err(LogError::InvalidSampleTime { sample_time });
         }
@@ -216,7 +244,7 @@ impl Assembly<'_> {
                     rounding: stamps.rounding,
                     same: &same,
                 };
-                let grid = clock::lay(&rows, self.roles.missing, self.roles.resample)?;
+                let grid = time_grid::lay(&rows, self.roles.missing, self.roles.resample)?;
                 said.extend(grid.said);
                 (grid.pieces, grid.step)
             }
@@ -477,7 +505,7 @@ fn phase(piece: &Piece, step: f64) -> f64 {
         .zip(&piece.times)
         .map(|(k, t)| t - first - *k as f64 * step);
     let mean = off.sum::<f64>() / piece.times.len().max(1) as f64;
-    if mean.abs() > super::sampling::STEP_TOLERANCE * step {
+    if mean.abs() > super::time::STEP_TOLERANCE * step {
         readable(first + mean)
     } else {
         first

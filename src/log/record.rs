@@ -1,16 +1,12 @@
 //! A whole recording in memory.
 
-use std::io::Read;
 use std::path::Path;
 
-use super::channel::Channel;
-use super::error::LogError;
-use super::reader::{Block, LogReader, check_same_channels, check_same_sampling};
-use super::reading::Reading;
-use super::roles::{RoleNeed, Roles};
-use super::sampling::is_sample_time;
-use super::source::Source;
-use super::writer::write_table;
+use super::log_error::LogError;
+use super::read::{Block, LogReader, check_same_channels, check_same_sampling};
+use super::sample_time::is_sample_time;
+use super::text::Channel;
+use super::write::write_table;
 use crate::limits;
 
 /// A recording: a uniform time base, named inputs u and named outputs y; a column a channel, N samples each.
@@ -69,34 +65,6 @@ impl Log {
     pub fn channel_data(&self) -> Vec<&[f64]> {
         let channels = self.input_data.iter().chain(&self.output_data);
         channels.map(Vec::as_slice).collect()
-    }
-
-    /// Reads a recording with at least one input and one output; [`Reading`] has what was recognised and repaired.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the file: see [`LogError`]; also that it is in several parts.
-    pub fn read(source: &Source, roles: &Roles) -> Result<Self, LogError> {
-        Self::read_with(source, roles, RoleNeed::Identify)
-    }
-
-    /// As [`Log::read`], with other roles needed.
-    ///
-    /// # Errors
-    /// As [`Log::read`].
-    pub fn read_with(source: &Source, roles: &Roles, need: RoleNeed) -> Result<Self, LogError> {
-        Reading::read(source, roles, need)?.whole()
-    }
-
-    /// As [`Log::read`], of bytes in memory; `name` stands for the file in messages.
-    ///
-    /// # Errors
-    /// As [`Log::read`].
-    pub fn from_reader(
-        name: &str,
-        reader: impl Read + Send + 'static,
-        roles: &Roles,
-    ) -> Result<Self, LogError> {
-        Reading::from_reader(name, reader, roles, RoleNeed::Identify)?.whole()
     }
 
     /// A plain file, from its reader.

@@ -2,10 +2,9 @@
 
 use std::collections::HashMap;
 
-use super::channel::Channel;
-use super::error::LogError;
-use super::header::Header;
-use super::sampling::is_sample_time;
+use super::log_error::LogError;
+use super::sample_time::is_sample_time;
+use super::text::{Channel, Header};
 
 /// What the user asked for: `--inputs`, `--outputs`, `--time`, `--dt`. The default leaves all to the headers.
 ///

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::error::ModelError;
+use super::model_error::ModelError;
 use super::state_space::StateSpace;
 
 /// Largest number of decades below the Nyquist frequency on the default grid.

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `state_space` | [`StateSpace`]: matrices, checks, change of basis |
 //! | `recursion` | the one loop over samples that simulation and prediction share |
-//! | `simulate` | free run from inputs (and innovations), also block by block: [`Simulator`] |
+//! | `simulate_system` | free run from inputs (and innovations), also block by block: [`Simulator`] |
 //! | `predict` | one-step predictions and innovations, also block by block: [`Predictor`] |
 //! | `initial_state` | the initial state that explains a recording best |
 //! | `frequency` | frequency responses from input and from innovation, default frequency grid |
@@ -12,27 +12,27 @@
 //! | `zeros` | invariant zeros |
 //! | `response` | impulse and step responses, static gain |
 //! | `armax` | the polynomials of a single-input single-output model |
-//! | `error` | [`ModelError`] |
+//! | `model_error` | [`ModelError`] |
 
 mod armax;
-mod error;
 mod frequency;
 mod initial_state;
+mod model_error;
 mod poles;
 mod predict;
 mod recursion;
 mod response;
-mod simulate;
+mod simulate_system;
 mod state_space;
 mod zeros;
 
 pub use armax::Armax;
-pub use error::ModelError;
 pub(crate) use frequency::resolvent_products;
 pub use initial_state::estimate_initial_state;
+pub use model_error::ModelError;
 pub use poles::Pole;
 pub(crate) use poles::slowest_first;
 pub use predict::{Prediction, Predictor};
-pub use simulate::Simulator;
+pub use simulate_system::Simulator;
 pub use state_space::StateSpace;
 pub(crate) use zeros::zero_directions;

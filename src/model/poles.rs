@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use num_complex::Complex64;
 
-use super::error::ModelError;
+use super::model_error::ModelError;
 use super::state_space::StateSpace;
 use crate::linalg::eigenvalues;
 

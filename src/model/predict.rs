@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::error::ModelError;
+use super::model_error::ModelError;
 use super::recursion::Recursion;
-use super::simulate::{common_length, initial_state, side_by_side};
+use super::simulate_system::{common_length, initial_state, side_by_side};
 use super::state_space::StateSpace;
 
 /// What a model foresees one sample ahead, and what it does not.

@@ -4,7 +4,7 @@ use std::fmt;
 
 use nalgebra::DMatrix;
 
-use super::error::ModelError;
+use super::model_error::ModelError;
 use crate::log::is_sample_time;
 
 /// Linear time-invariant system in innovation form,

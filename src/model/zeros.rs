@@ -13,7 +13,7 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::error::ModelError;
+use super::model_error::ModelError;
 use super::poles::{Pole, slowest_first};
 use super::state_space::StateSpace;
 use crate::linalg::{generalised_eigenvalues, svd_thin};

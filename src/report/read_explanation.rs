@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use super::error::{DocumentError, repeated};
-use super::location::position_of;
-use super::read::{broken, no_document};
+use super::document_error::{DocumentError, repeated};
+use super::json_location::position_of;
+use super::model::{broken, no_document};
 use crate::explain::{AugmentedModel, EXPLANATION_FORMAT, Explanation};
 
 /// Whether `text` is JSON that calls itself an explanation.

@@ -19,30 +19,30 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `document`, `figure` | what a reproduction delivers |
-//! | `study` | runs in parallel; each has its own seed, so that results depend neither on threads nor on their number |
-//! | `statistics`, `words` | percentiles and moments over runs; numbers in sentences |
-//! | `data` | the data factor of a simulated recording |
+//! | `monte_carlo_runs` | runs in parallel; each has its own seed, so that results depend neither on threads nor on their number |
+//! | `statistics`, `plain_numbers` | percentiles and moments over runs; numbers in sentences |
+//! | `data_factor` | the data factor of a simulated recording |
 //! | `van_wingerden` | van Wingerden: both examples |
 //! | `chiuso_picci` | Chiuso & Picci: both examples |
 //! | `knudsen` | Knudsen: all three systems |
 
 mod chiuso_picci;
-mod data;
+mod data_factor;
 mod document;
-mod error;
 mod figure;
 mod knudsen;
+mod monte_carlo_runs;
+mod plain_numbers;
+mod reproduce_error;
 mod statistics;
-mod study;
 mod van_wingerden;
-mod words;
 
 pub use chiuso_picci::{ChiusoPicciOne, ChiusoPicciTwo};
 pub use document::{Agreement, Comparison, Fact, Origin, REPRODUCTION_FORMAT, Reproduction};
-pub use error::ReproduceError;
 pub use figure::{BarSeries, Bars, Curve, Figure, Panel, Quantity, Role, Row, Table};
 pub use knudsen::{KnudsenExperiment, knudsen_experiments};
-pub use study::{LEAST_RUNS, Study};
+pub use monte_carlo_runs::{LEAST_RUNS, Study};
+pub use reproduce_error::ReproduceError;
 pub use van_wingerden::{VanWingerdenOne, VanWingerdenTwo};
 
 /// An experiment of a paper.

@@ -3,10 +3,10 @@
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::options::{Relation, ValidationOptions};
+use super::parameter_errors::Sensitivity;
 use super::residuals::Residuals;
 use super::result::{InnovationSize, OutputSize};
-use super::sensitivity::Sensitivity;
+use super::validation_options::{Relation, ValidationOptions};
 
 /// Compares the residual variance `s` of each output with the stated variance.
 ///

@@ -21,13 +21,11 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::error::ValidateError;
-use super::filters::Filters;
-use super::options::{RecordView, ValidationOptions};
-use super::partial::Partial;
-use super::residuals::{Residuals, Start, cut, start_up};
+use super::parameter_errors::{Filters, directions};
+use super::residuals::{Partial, Residuals, Start, cut, start_up};
 use super::result::{LinearityScope, ResidualTest, Strongest};
-use super::sensitivity::directions;
+use super::validate_error::ValidateError;
+use super::validation_options::{RecordView, ValidationOptions};
 use crate::covariance::ParameterCovariance;
 use crate::linalg::{multiply, multiply_tn, symmetric_eigen};
 use crate::model::{Predictor, StateSpace, estimate_initial_state};

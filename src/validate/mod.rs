@@ -3,7 +3,7 @@
 //! Residuals `e[k]` are the innovations of the one-step predictor (the simulation errors of a model with
 //! `K = 0`), without the start-up in which the estimated initial state still shows. A right model leaves
 //! residuals that nothing known at the time predicts: neither their own past (*whiteness*) nor past
-//! inputs. Both are tested as partial correlations, see `partial`:
+//! inputs. Both are tested as partial correlations, see `residuals`:
 //!
 //! | test | target | regressors tested | given |
 //! |---|---|---|---|
@@ -21,8 +21,8 @@
 //!   neither inflates the statistic nor hides what inputs do, in closed loop too, where past inputs carry
 //!   past residuals.
 //! - *Parameter errors.* Residuals come from estimated parameters. Their covariance widens the covariance of
-//!   the correlations on a fresh record and narrows it on the record estimated from, see `statistic`; the
-//!   degrees of freedom follow from its rank. What first-order theory misses on a fresh record (`curvature`)
+//!   the correlations on a fresh record and narrows it on the record estimated from, see `parameter_errors`; the
+//!   degrees of freedom follow from its rank. What first-order theory misses on a fresh record
 //!   widens it too.
 //! - *Offsets.* Means over the record are taken out of inputs and residuals, and reported with the fit.
 //!
@@ -32,12 +32,10 @@
 //! Because everything is significant in a long record, each test says which share of the variance it is
 //! about (`R^2`, adjusted for degrees of freedom).
 //!
-//! | file | what it holds |
+//! | folder or file | what it holds |
 //! |---|---|
-//! | `residuals`, `fit_measure` | the one pass over the records |
-//! | `partial`, `own_past` | partial correlations from lag products; how much past to allow for |
-//! | `filters`, `sensitivity`, `curvature` | what the errors of the parameters do, first and second order |
-//! | `statistic` | statistic, degrees of freedom, bounds |
+//! | `residuals` | the one pass over the records; partial correlations from lag products; how much past to allow for |
+//! | `parameter_errors` | what the errors of the parameters do, first and second order; statistic, degrees of freedom, bounds |
 //! | `linearity` | squares and products of the past |
 //! | `length` | how long a record must be for any of this |
 //! | `innovation_size` | residual variance against the stated one |
@@ -47,48 +45,40 @@
 //!
 //! Source: Ljung, *System Identification*, 2nd ed. (1999), chapter 16.
 
-mod check;
-mod curvature;
 mod deviations;
-mod error;
-mod filters;
-mod fit_measure;
 mod identified;
 mod innovation_size;
 mod length;
 mod linearity;
-mod options;
-mod own_past;
-mod partial;
+mod parameter_errors;
+mod preconditions;
 mod residuals;
 mod result;
-mod sensitivity;
-mod statistic;
+mod validate_error;
+mod validation_options;
 mod verdict;
 
 #[cfg(test)]
 mod tests;
 
 pub use deviations::{Deviations, Zero, judge};
-pub use error::ValidateError;
-pub use fit_measure::fit_measure;
 pub use identified::{TestedModel, identify_and_test, test_residuals};
 pub(crate) use length::too_short;
-pub use options::{RecordView, Relation, ValidationOptions};
+pub use residuals::fit_measure;
 pub use result::{
     FitMeasure, InnovationSize, LinearityScope, OutputFit, OutputSize, PairCorrelation,
     ResidualTest, Strongest, TooShort, Validation,
 };
+pub use validate_error::ValidateError;
+pub use validation_options::{RecordView, Relation, ValidationOptions};
 
 use nalgebra::DMatrix;
 
 use crate::covariance::{MOST_LAGS, ParameterCovariance};
 use crate::model::StateSpace;
 use linearity::Linearity;
-use partial::Partial;
-use residuals::Residuals;
-use sensitivity::{Regressor, Sensitivity};
-use statistic::{Outcome, ScoreCovariance, outcome};
+use parameter_errors::{Outcome, Regressor, ScoreCovariance, Sensitivity, outcome};
+use residuals::{Partial, Residuals};
 
 /// Samples of each channel for one lag, by default.
 const SAMPLES_PER_LAG: usize = 10;
@@ -115,14 +105,14 @@ pub fn validate(
     relation: Relation,
     options: &ValidationOptions,
 ) -> Result<Validation, ValidateError> {
-    check::check(system, innovation_covariance, covariance, records, options)?;
+    preconditions::check(system, innovation_covariance, covariance, records, options)?;
     let (r, l) = (system.inputs(), system.outputs());
     let q = r + l;
     let samples: usize = records.iter().map(RecordView::samples).sum();
     let lags = options
         .lags
         .unwrap_or_else(|| (samples / (SAMPLES_PER_LAG * q)).clamp(1, MOST_LAGS));
-    let longest = own_past::longest(samples, q);
+    let longest = residuals::longest(samples, q);
     let past = lags.max(longest);
     let needed_columns = q
         .saturating_mul(lags)
@@ -154,7 +144,7 @@ pub fn validate(
     let tests = Tests {
         residuals: &residuals,
         lags,
-        own_past: own_past::order(&residuals, r, l, longest),
+        own_past: residuals::order(&residuals, r, l, longest),
         longest,
         options,
     };
@@ -324,7 +314,7 @@ impl Tests<'_> {
         if r == 0 {
             return Ok(None);
         }
-        let own = own_past::order(self.residuals, 0, r, self.longest);
+        let own = residuals::order(self.residuals, 0, r, self.longest);
         let target = self.input_lags(0..=0);
         let tested = self.residual_lags(1..=self.lags);
         let given = self.input_lags(1..=own);

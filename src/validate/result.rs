@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::options::Relation;
+use super::validation_options::Relation;
 
 /// Everything that [`validate`](super::validate()) found out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -1,7 +1,7 @@
 //! The verdict, and what it means in words.
 
-use super::options::Relation;
 use super::result::{ResidualTest, Validation};
+use super::validation_options::Relation;
 
 /// Explained shares below this are called small: they change a prediction by less than a tenth of the
 /// residual's size.

@@ -7,15 +7,15 @@
 mod bytes;
 mod csv_reader;
 mod edits;
-mod explain;
+mod explain_logs;
 mod explanation_json;
-mod identify;
+mod identify_logs;
 mod logs;
 mod model_json;
 mod sound;
 
 pub use csv_reader::csv_reader;
-pub use explain::explain_log as explain;
+pub use explain_logs::explain_log as explain;
 pub use explanation_json::{explanation_json, parse as parse_explanation};
-pub use identify::{identify_log as identify, run as run_identify};
+pub use identify_logs::{identify_log as identify, run as run_identify};
 pub use model_json::{model_json, parse as parse_model};

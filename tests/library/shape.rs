@@ -1,23 +1,49 @@
-//! The shape of the code: modules use each other one way (`src/lib.rs` has the map), told from the paths in the sources.
+//! The shape of the code: modules use each other one way (`src/lib.rs` has the map), told from the paths in the sources;
+//! folders hold few files, and a file's name says which one it is.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// Files in a folder, subfolders apart, so that its listing is read at a glance.
+const MOST_FILES: usize = 12;
+/// Folders of `src/` that hold more. This list and those below only become shorter.
+const CROWDED: [&str; 4] = [
+    "explain",
+    "explain/effects",
+    "explain/engine",
+    "physics/simulation",
+];
+/// Folders of `src/` in which names of files are repeated, in them or outside.
+const REPEATING: [&str; 2] = ["explain", "physics"];
+/// Modules that are not looked at for circles between their files.
+const ENTANGLED: [&str; 2] = ["explain", "physics"];
+
 /// A module, and for each module that it uses the files that do.
 type Graph = BTreeMap<String, BTreeMap<String, BTreeSet<PathBuf>>>;
 
-fn sources(folder: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Every file in a folder and its subfolders.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.is_dir() {
-            files.extend(sources(&path));
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            files.push(path);
+            found.extend(files(&path));
+        } else {
+            found.push(path);
         }
     }
-    files
+    found
+}
+
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut sources = files(folder);
+    sources.retain(|path| path.extension().is_some_and(|e| e == "rs"));
+    sources
 }
 
 /// `src/a/b.rs` and `src/a/b/mod.rs` are `[a, b]`, the root of the crate is `[]`.
@@ -150,49 +176,75 @@ fn exports(text: &str) -> BTreeMap<String, String> {
         .collect()
 }
 
-/// What the modules in the module `root` use of each other, tests and their fixtures apart. Between the modules of `src/`
-/// links in the documentation count too; inside one of them a part may point to the function that it is a part of.
-fn graph(root: &[&str]) -> Graph {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let read: Vec<_> = sources(&src)
-        .into_iter()
-        .map(|file| {
-            let module = module_of(&file, &src);
-            let (mut text, tests) = without_tests(&fs::read_to_string(&file).unwrap());
-            if !root.is_empty() {
-                let code = |line: &&str| !line.trim_start().starts_with("//");
-                text = text.lines().filter(code).collect::<Vec<_>>().join("\n");
-            }
-            (file, module, text, tests)
-        })
-        .collect();
-    let mut of_tests = BTreeSet::new();
-    for (_, module, _, tests) in &read {
-        of_tests.extend(tests.iter().map(|name| {
+/// A source as it is looked at.
+struct Read {
+    /// From `src/`.
+    file: PathBuf,
+    module: Vec<String>,
+    /// Without comments and without what only tests see.
+    code: String,
+    /// Paths that it names, those of its comments too.
+    paths: Vec<Vec<String>>,
+    /// Without those.
+    paths_of_code: Vec<Vec<String>>,
+}
+
+/// The sources without tests and their fixtures.
+fn read() -> Vec<Read> {
+    let src = root().join("src");
+    let (mut read, mut of_tests) = (Vec::new(), BTreeSet::new());
+    for file in sources(&src) {
+        let module = module_of(&file, &src);
+        if module.iter().any(|part| part == "tests") {
+            continue;
+        }
+        let (text, tests) = without_tests(&fs::read_to_string(&file).unwrap());
+        of_tests.extend(tests.into_iter().map(|name| {
             let mut path = module.clone();
-            path.push(name.clone());
+            path.push(name);
             path
         }));
+        let code = |line: &&str| !line.trim_start().starts_with("//");
+        let code = text.lines().filter(code).collect::<Vec<_>>().join("\n");
+        read.push(Read {
+            file: file.strip_prefix(&src).unwrap().to_owned(),
+            paths: paths(&text, &module),
+            paths_of_code: paths(&code, &module),
+            module,
+            code,
+        });
     }
+    read.retain(|Read { module, .. }| {
+        !(1..=module.len()).any(|length| of_tests.contains(&module[..length]))
+    });
+    read
+}
+
+/// What the modules in the module `root` use of each other. Between the modules of `src/` links in the documentation
+/// count too; inside one of them a part may point to the function that it is a part of.
+fn graph(read: &[Read], root: &[&str]) -> Graph {
     // The module in `root` that a path leads into.
     let inside = |path: &[String]| -> Option<String> {
         path.starts_with(&root.iter().map(ToString::to_string).collect::<Vec<_>>())
             .then(|| path.get(root.len()).cloned())?
     };
-    let modules: BTreeSet<String> = read.iter().filter_map(|(_, m, ..)| inside(m)).collect();
+    let modules: BTreeSet<String> = read.iter().filter_map(|r| inside(&r.module)).collect();
     let exported: BTreeMap<String, String> = read
         .iter()
-        .filter(|(_, module, ..)| module == root)
-        .flat_map(|(_, _, text, _)| exports(text))
+        .filter(|source| source.module == root)
+        .flat_map(|source| exports(&source.code))
         .collect();
     let mut graph = Graph::new();
-    for (file, module, text, _) in &read {
-        let tested = (1..=module.len()).any(|length| of_tests.contains(&module[..length]));
-        let Some(user) = inside(module).filter(|_| !tested) else {
+    for source in read {
+        let Some(user) = inside(&source.module) else {
             continue;
         };
-        for path in paths(text, module) {
-            let Some(name) = inside(&path) else {
+        let paths = match root {
+            [] => &source.paths,
+            _ => &source.paths_of_code,
+        };
+        for path in paths {
+            let Some(name) = inside(path) else {
                 continue;
             };
             let used = if modules.contains(&name) {
@@ -205,7 +257,7 @@ fn graph(root: &[&str]) -> Graph {
             if *used != user && modules.contains(used) {
                 let uses = graph.entry(user.clone()).or_default();
                 let files = uses.entry(used.clone()).or_default();
-                files.insert(file.strip_prefix(&src).unwrap().to_owned());
+                files.insert(source.file.clone());
             }
         }
     }
@@ -235,9 +287,39 @@ fn circular(graph: &Graph) -> Vec<String> {
     found
 }
 
+/// Folders of `src/` with what holds for them, each as a path from there.
+fn folders() -> BTreeMap<String, Vec<PathBuf>> {
+    let src = root().join("src");
+    let mut folders = BTreeMap::<String, Vec<PathBuf>>::new();
+    for file in files(&src) {
+        let folder = file.parent().unwrap().strip_prefix(&src).unwrap();
+        let folder = folder.to_str().unwrap().replace('\\', "/");
+        folders.entry(folder).or_default().push(file);
+    }
+    folders
+}
+
+/// Names of files, other than those that Rust and Cargo ask for, that stand in several of the places.
+fn repeated<'a>(places: impl IntoIterator<Item = &'a PathBuf>) -> Vec<Vec<&'a PathBuf>> {
+    let mut named = BTreeMap::<_, Vec<_>>::new();
+    for file in places {
+        named
+            .entry(file.file_name().unwrap())
+            .or_default()
+            .push(file);
+    }
+    for given in ["mod.rs", "lib.rs", "main.rs"] {
+        named.remove(std::ffi::OsStr::new(given));
+    }
+    named
+        .into_values()
+        .filter(|files| files.len() > 1)
+        .collect()
+}
+
 #[test]
 fn modules_use_each_other_one_way() {
-    let graph = graph(&[]);
+    let graph = graph(&read(), &[]);
     // What is read is what there is.
     assert!(graph["identify"].contains_key("moments"), "{graph:?}");
     assert!(graph["report"].contains_key("explain"), "{graph:?}");
@@ -246,11 +328,63 @@ fn modules_use_each_other_one_way() {
 }
 
 #[test]
-fn modules_of_identify_use_each_other_one_way() {
-    let graph = graph(&["identify"]);
-    assert!(graph["method"].contains_key("pbsid_opt"), "{graph:?}");
-    let circular = circular(&graph);
-    assert!(circular.is_empty(), "{}", circular.join("\n"));
+fn files_and_subfolders_use_each_other_one_way() {
+    let read = read();
+    let identify = graph(&read, &["identify"]);
+    assert!(identify["method"].contains_key("subspace"), "{identify:?}");
+    let order = graph(&read, &["identify", "order"]);
+    assert!(order["select_order"].contains_key("evidence"), "{order:?}");
+    let mut found = Vec::new();
+    for folder in folders().into_keys() {
+        let modules: Vec<&str> = folder.split('/').filter(|part| !part.is_empty()).collect();
+        if modules
+            .first()
+            .is_some_and(|first| !ENTANGLED.contains(first))
+        {
+            let circular = circular(&graph(&read, &modules));
+            found.extend(
+                circular
+                    .into_iter()
+                    .map(|circle| format!("{folder}: {circle}")),
+            );
+        }
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn folders_hold_few_files() {
+    let mut crowded = folders();
+    crowded.retain(|_, files| files.len() > MOST_FILES);
+    let crowded: Vec<String> = crowded.into_keys().collect();
+    assert_eq!(
+        crowded, CROWDED,
+        "folders with more than {MOST_FILES} files"
+    );
+}
+
+#[test]
+fn names_of_files_are_not_repeated() {
+    let src = root().join("src");
+    let all = sources(&src);
+    let beside = |file: &&PathBuf| {
+        let listed = |folder: &&str| file.starts_with(src.join(folder));
+        !REPEATING.iter().any(|folder| listed(&folder))
+    };
+    let found = repeated(all.iter().filter(beside));
+    assert!(found.is_empty(), "{found:#?}");
+    for folder in REPEATING {
+        let found = repeated(&all);
+        let mut found = found.iter().flatten();
+        let still = found.any(|file| file.starts_with(src.join(folder)));
+        assert!(
+            still,
+            "{folder} repeats no name any more: take it from the list"
+        );
+    }
+    let tests = sources(&root().join("tests"));
+    let found = repeated(&tests);
+    assert!(found.is_empty(), "{found:#?}");
 }
 
 #[test]

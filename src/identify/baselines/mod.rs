@@ -16,7 +16,7 @@ mod table_two;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use super::error::IdentifyError;
+use super::identify_error::IdentifyError;
 use super::knudsen::Regression;
 use crate::linalg::{
     LinalgError, multiply, multiply_tn, qr_r, qr_thin, solve_upper_transposed, stationary_filter,

@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use super::super::error::IdentifyError;
 use super::super::knudsen::{Observability, Regression, inputs};
 use super::super::pem::Signals;
 use super::{BaselineEstimate, ProjectionWeight, noise_model, weighted_observability};
+use crate::identify::IdentifyError;
 use crate::linalg::{
     least_squares, multiply, multiply_nt, pseudo_inverse, qr_r, solve_upper, spectral_radius,
 };

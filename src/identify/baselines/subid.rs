@@ -2,9 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::super::error::IdentifyError;
 use super::super::knudsen::{Regression, extended_observability};
 use super::{BaselineEstimate, ProjectionWeight, noise_model, weighted_observability};
+use crate::identify::IdentifyError;
 use crate::linalg::{least_squares, multiply, multiply_nt, pseudo_inverse};
 use crate::model::StateSpace;
 

@@ -1,12 +1,12 @@
 //! The methods of table 2 of Knudsen (2001) on one recording, as ARMAX parameters.
 
-use super::super::error::IdentifyError;
 use super::super::horizon;
 use super::super::knudsen::{
     Decomposition, NoiseModel, Regression, ResidualStep, knudsen, minimum_phase,
 };
 use super::super::pem::{Form, STEPS, prediction_error_method};
 use super::{BaselineEstimate, ProjectionWeight, n4sid, subid};
+use crate::identify::IdentifyError;
 use crate::log::Log;
 use crate::model::StateSpace;
 use crate::moments::{PanelQr, RFactor, Trend};

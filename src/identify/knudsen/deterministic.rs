@@ -2,9 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::super::error::IdentifyError;
+use super::future_regression::Regression;
 use super::observability::{Decomposition, LeastSquares, Observability};
-use super::regression::Regression;
+use crate::identify::IdentifyError;
 
 /// The deterministic part of a model.
 #[derive(Debug, Clone)]

@@ -11,8 +11,8 @@
 
 use nalgebra::DMatrix;
 
+use super::future_regression::Regression;
 use super::jacobian::Jacobian;
-use super::regression::Regression;
 use crate::covariance::ParameterCovariance;
 use crate::linalg::{
     LinalgError, multiply, multiply_nt, solve_upper, solve_upper_transposed, symmetric_eigen,

@@ -8,14 +8,14 @@
 
 use nalgebra::DMatrix;
 
-use super::super::error::IdentifyError;
 use super::deterministic::Deterministic;
+use super::future_regression::Regression;
 use super::observability::{
     Decomposition, LeastSquares, extended_observability, stacked, toeplitz_regressor,
 };
-use super::regression::Regression;
 use super::stochastic::{NoiseModel, ResidualStep, gain_of_factor, right_quotient};
 use crate::covariance::ParameterLayout;
+use crate::identify::IdentifyError;
 use crate::linalg::{cholesky_upper, multiply, multiply_tn, solve_upper, solve_upper_transposed};
 
 /// Jacobian of `[theta; vech R]`, `theta` laid out by `layout`, `vech R` the lower triangle of the innovation

@@ -7,7 +7,7 @@
 //!
 //! | file | step | equations |
 //! |---|---|---|
-//! | `regression` | `Theta` and `P` | (7)-(8), (25) |
+//! | `future_regression` | `Theta` and `P` | (7)-(8), (25) |
 //! | `observability` | `Gamma_h`, its complement, the Toeplitz least-squares problem | (13)-(15), (24), (38) |
 //! | `deterministic` | `A`, `B`, `C`, `D` | (22)-(24) |
 //! | `stochastic` | `K`, `R`; the minimum-phase noise model | (35)-(40) |
@@ -22,22 +22,22 @@
 //! every part of the estimate is biased.
 
 mod deterministic;
+mod future_regression;
 mod influence;
 mod jacobian;
 mod observability;
-mod regression;
 mod stochastic;
 #[cfg(test)]
 mod tests;
 
-use super::error::IdentifyError;
+use super::identify_error::IdentifyError;
 use crate::model::StateSpace;
 
 pub use deterministic::{Deterministic, deterministic, inputs};
+pub use future_regression::Regression;
 pub use influence::{DeltaCovariance, Influence};
 pub use jacobian::{Jacobian, jacobian};
 pub use observability::{Decomposition, Observability, extended_observability};
-pub use regression::Regression;
 pub use stochastic::{NoiseModel, ResidualStep, minimum_phase, stochastic};
 
 /// A model of one order with what its covariance needs.

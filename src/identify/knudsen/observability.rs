@@ -3,8 +3,8 @@
 
 use nalgebra::DMatrix;
 
-use super::super::error::IdentifyError;
-use super::regression::Regression;
+use super::future_regression::Regression;
+use crate::identify::IdentifyError;
 use crate::linalg::{
     LinalgError, multiply, multiply_tn, qr_thin, reciprocal_condition_upper, solve_upper,
     solve_upper_transposed, svd_thin,

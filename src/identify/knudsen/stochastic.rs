@@ -4,9 +4,9 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use super::super::error::IdentifyError;
+use super::future_regression::Regression;
 use super::observability::{LeastSquares, Observability};
-use super::regression::Regression;
+use crate::identify::IdentifyError;
 use crate::linalg::{
     LinalgError, cholesky_upper, solve_upper, solve_upper_transposed, spectral_radius,
     stabilising_observer_gain,

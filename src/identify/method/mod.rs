@@ -6,17 +6,17 @@
 //!
 //! | file | method | source |
 //! |---|---|---|
-//! | `pbsid_opt` | [`Method::PbsidOpt`] | van Wingerden |
-//! | `knudsen` | [`Method::Knudsen`] | Knudsen |
-//! | `pem` | [`Method::Pem`] | Ljung |
-//! | `subid` | [`Method::Subid`] | van Overschee & De Moor |
-//! | `closed_loop` | [`Method::Whitening`], [`Method::InnovationEstimation`] | Chiuso & Picci |
+//! | `pbsid_opt_method` | [`Method::PbsidOpt`] | van Wingerden |
+//! | `knudsen_method` | [`Method::Knudsen`] | Knudsen |
+//! | `pem_method` | [`Method::Pem`] | Ljung |
+//! | `subid_method` | [`Method::Subid`] | van Overschee & De Moor |
+//! | `closed_loop_method` | [`Method::Whitening`], [`Method::InnovationEstimation`] | Chiuso & Picci |
 
-mod closed_loop;
-mod knudsen;
-mod pbsid_opt;
-mod pem;
-mod subid;
+mod closed_loop_method;
+mod knudsen_method;
+mod pbsid_opt_method;
+mod pem_method;
+mod subid_method;
 
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -25,12 +25,10 @@ use nalgebra::DMatrix;
 
 pub use super::algorithms::Method;
 use super::algorithms::Stochastic;
-use super::error::IdentifyError;
-use super::nested::Prediction;
-use super::pbsid_opt::Weight;
-use super::source::Source;
+use super::data::Source;
+use super::identify_error::IdentifyError;
+use super::subspace::{Prediction, Varx, Weight};
 use super::variance::Propagation;
-use super::varx::Varx;
 use crate::covariance::ParameterCovariance;
 use crate::model::StateSpace;
 use crate::moments::RFactor;
@@ -46,14 +44,16 @@ impl Method {
         source: &mut Source<'_>,
     ) -> Result<Decomposed, IdentifyError> {
         match self {
-            Self::PbsidOpt => pbsid_opt::decomposed(windows),
-            Self::Whitening => closed_loop::decomposed(Prediction::Whitening, windows, source),
-            Self::InnovationEstimation => {
-                closed_loop::decomposed(Prediction::InnovationEstimation, windows, source)
+            Self::PbsidOpt => pbsid_opt_method::decomposed(windows),
+            Self::Whitening => {
+                closed_loop_method::decomposed(Prediction::Whitening, windows, source)
             }
-            Self::Knudsen => knudsen::decomposed(windows, source),
-            Self::Pem => pem::decomposed(windows, source),
-            Self::Subid => subid::decomposed(windows, source),
+            Self::InnovationEstimation => {
+                closed_loop_method::decomposed(Prediction::InnovationEstimation, windows, source)
+            }
+            Self::Knudsen => knudsen_method::decomposed(windows, source),
+            Self::Pem => pem_method::decomposed(windows, source),
+            Self::Subid => subid_method::decomposed(windows, source),
         }
     }
 }

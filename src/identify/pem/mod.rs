@@ -20,7 +20,7 @@ mod tests;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::error::IdentifyError;
+use super::identify_error::IdentifyError;
 use crate::covariance::{ParameterCovariance, ParameterLayout};
 use crate::linalg::{
     LinalgError, all_finite, cholesky_upper, multiply_nt, multiply_tn, qr_r,

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::super::varx::Varx;
 use super::predictor::{controllability, observability};
+use crate::identify::subspace::Varx;
 use crate::linalg::{Svd, cholesky_upper, multiply_nt, qr_r, solve_upper_transposed, svd_thin};
 use crate::model::StateSpace;
 

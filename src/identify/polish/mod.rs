@@ -26,7 +26,7 @@ pub(super) use self::predictor::Problem;
 pub use self::predictor::predictor_coefficients;
 pub(super) use self::stabilised::stabilised;
 use super::stable::{with_poles_inside, with_stable_predictor};
-use super::varx::Varx;
+use super::subspace::Varx;
 use crate::covariance::{ParameterCovariance, ParameterLayout};
 use crate::linalg::{LinalgError, all_finite, cholesky_upper, multiply_nt, solve_upper_transposed};
 use crate::model::StateSpace;

@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::super::varx::Varx;
 use crate::covariance::ParameterLayout;
+use crate::identify::subspace::Varx;
 use crate::linalg::{LinalgError, cholesky_upper, multiply, multiply_nt, solve_upper_transposed};
 use crate::model::StateSpace;
 

@@ -2,7 +2,7 @@
 
 use super::{Effort, Polished, polish};
 use crate::identify::stable::{largest_stable_radius, with_poles_inside};
-use crate::identify::varx::Varx;
+use crate::identify::subspace::Varx;
 use crate::linalg::LinalgError;
 use crate::model::StateSpace;
 

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::{Stochastic, StochasticPart};
-use crate::identify::error::IdentifyError;
+use crate::identify::IdentifyError;
+use crate::identify::data::Source;
 use crate::identify::method::{Decomposed, Estimated, Orders, Uncertain, Windows};
-use crate::identify::source::Source;
 use crate::identify::variance::Propagation;
 use crate::model::StateSpace;
 use crate::moments::RFactor;

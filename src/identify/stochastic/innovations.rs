@@ -8,12 +8,12 @@ use nalgebra::{DMatrix, DVector};
 
 use super::StochasticPart;
 use crate::covariance::ParameterLayout;
-use crate::identify::error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::identify::method::Windows;
 use crate::identify::polish::Problem;
 use crate::identify::stable::with_stable_predictor;
+use crate::identify::subspace::{Varx, varx};
 use crate::identify::variance::Propagation;
-use crate::identify::varx::{Varx, varx};
 use crate::linalg::{
     cholesky_upper, least_squares, multiply, multiply_nt, pseudo_inverse, solve_upper_transposed,
 };

@@ -16,7 +16,7 @@ mod residual;
 use nalgebra::DMatrix;
 
 pub use super::algorithms::Stochastic;
-use super::error::IdentifyError;
+use super::identify_error::IdentifyError;
 use super::knudsen::ResidualStep;
 use super::method::{Decomposed, Windows};
 use super::variance::Propagation;

@@ -1,7 +1,7 @@
 //! Knudsen's stochastic steps for the deterministic part of any method.
 
 use super::StochasticPart;
-use crate::identify::error::IdentifyError;
+use crate::identify::IdentifyError;
 use crate::identify::knudsen::{
     Observability, Regression, ResidualStep, minimum_phase, stochastic,
 };

@@ -10,9 +10,7 @@ use nalgebra::DMatrix;
 use super::nested_errors::NestedErrors;
 use super::subspace::subspace_covariance;
 use crate::covariance::{CovarianceError, ParameterCovariance};
-use crate::identify::nested::Prediction;
-use crate::identify::pbsid_opt::{Estimate, Weight};
-use crate::identify::varx::Varx;
+use crate::identify::subspace::{Estimate, Prediction, Varx, Weight};
 use crate::linalg::{
     LinalgError, cholesky_upper, discrete_lyapunov, multiply, multiply_nt, multiply_tn,
     pseudo_inverse, solve_upper, solve_upper_transposed,

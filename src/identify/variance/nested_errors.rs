@@ -29,7 +29,7 @@ use nalgebra::DMatrix;
 
 use super::propagation::Propagation;
 use crate::covariance::ParameterLayout;
-use crate::identify::nested::Prediction;
+use crate::identify::subspace::Prediction;
 use crate::linalg::{LinalgError, multiply, solve_upper_transposed, symmetric_square_root_factor};
 use crate::model::StateSpace;
 

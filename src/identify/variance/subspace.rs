@@ -17,8 +17,7 @@ use nalgebra::DMatrix;
 
 use super::propagation::Propagation;
 use crate::covariance::{ParameterCovariance, ParameterLayout};
-use crate::identify::pbsid_opt::Estimate;
-use crate::identify::varx::Varx;
+use crate::identify::subspace::{Estimate, Varx};
 use crate::linalg::{
     LinalgError, multiply, multiply_nt, pseudo_inverse, solve_upper_right,
     symmetric_square_root_factor,

@@ -1,9 +1,9 @@
 //! Tests of the module as a whole; each file one idea.
 
-mod errors;
-mod reading;
-mod sampling;
-mod writing;
+mod error_tests;
+mod reading_tests;
+mod sampling_tests;
+mod writing_tests;
 
 use std::io::{self, Cursor, Read, Write};
 

@@ -6,26 +6,26 @@
 //! | `explanation`, `identification`, `plant`, `reproduction` | what each page shows          |
 //! | `plot`           | a picture as data: axes, series, shaded windows                       |
 //! | `thin`           | long lines thinned, digits that a screen can show                     |
-//! | `number`         | how numbers are written                                               |
+//! | `typeset_number` | how numbers are written                                               |
 //! | `base.html`, `plots.html`, `style.css` | frame, pictures and looks of every page         |
 //! | `draw.js`        | draws the pictures                                                    |
-//! | `library`        | plotly.js, which does the drawing                                     |
+//! | `plotly`         | plotly.js, which does the drawing                                     |
 //!
 //! Whatever comes from files (names, units, sentences) is escaped: by the templates in HTML, by `plot` in the data of
 //! pictures, and by `draw.js` where plotly.js reads tags in texts. The content security policy of the page allows
 //! nothing to be loaded.
 
-mod error;
 pub(in crate::report) mod explanation;
 mod head;
 pub(in crate::report) mod identification;
-mod library;
-mod number;
+mod page_error;
 pub(in crate::report) mod plant;
 mod plot;
+mod plotly;
+mod provenance;
 pub(in crate::report) mod reproduction;
-mod source;
 mod thin;
+mod typeset_number;
 
 #[cfg(test)]
 mod tests;
@@ -35,7 +35,7 @@ use minijinja::value::{Serde, Value};
 use minijinja::{AutoEscape, Environment, UndefinedBehavior, context};
 use serde::Serialize;
 
-pub use error::PageError;
+pub use page_error::PageError;
 
 const BASE: &str = include_str!("base.html");
 const PLOTS: &str = include_str!("plots.html");
@@ -69,6 +69,6 @@ fn render<T: Serialize>(
         page => Value::from(Serde(page)),
         style => STYLE,
         script => SCRIPT,
-        library => library::plotly(),
+        library => plotly::plotly(),
     })?)
 }

@@ -2,8 +2,8 @@
 
 use serde::{Serialize, Serializer};
 
-use super::number::{fixed, with_unit};
 use super::thin::{rounded, thinned};
+use super::typeset_number::{fixed, with_unit};
 
 /// Pictures that belong together.
 #[derive(Debug, Clone, PartialEq, Serialize)]

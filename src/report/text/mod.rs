@@ -2,39 +2,27 @@
 
 mod effects_text;
 mod explanation_text;
-mod linearisation_text;
-mod model_text;
+mod model;
 mod number;
-mod orders;
-mod plant_text;
-mod plant_validation_text;
+mod plant;
 mod reproduction_text;
-mod roots;
-mod show;
 mod table;
-mod validation_text;
-mod verdict;
 
 pub use effects_text::{UnknownId, effects_text};
 pub use explanation_text::explanation_text;
-pub use linearisation_text::linearisation_text;
-pub use model_text::{ModelText, model_text};
-pub(crate) use model_text::{fit_table, method};
+pub use model::{ModelText, comparison, model_text, show_text, validation_text, verdict};
+pub(crate) use model::{
+    doubtful, findings, fit_table, gain_table, linearity_tested, method, order_table, pole_table,
+    test_tables, too_short,
+};
 pub(crate) use number::percent;
-pub use orders::comparison;
-pub(crate) use orders::order_table;
-pub(crate) use plant_text::{leaves_something_out, parameter_table, verdict as plant_verdict};
-pub use plant_text::{plant_estimate_text, plant_text};
-pub use plant_validation_text::plant_validation_text;
-pub(crate) use plant_validation_text::{initial_state_table, residual_test_table};
+pub(crate) use plant::{
+    initial_state_table, leaves_something_out, parameter_table, residual_test_table,
+    verdict as plant_verdict,
+};
+pub use plant::{linearisation_text, plant_estimate_text, plant_text, plant_validation_text};
 pub use reproduction_text::reproduction_text;
-pub(crate) use roots::{gain_table, pole_table};
-pub use show::show_text;
 pub(crate) use table::Table;
-pub use validation_text::validation_text;
-pub(crate) use validation_text::{findings, linearity_tested, test_tables};
-pub use verdict::verdict;
-pub(crate) use verdict::{doubtful, too_short};
 
 /// Widest line.
 pub const WIDTH: usize = 100;

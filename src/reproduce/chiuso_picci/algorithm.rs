@@ -8,8 +8,8 @@ use crate::identify::{Method, Options, Order, Polish, Prediction, Weight, identi
 use crate::log::Log;
 use crate::model::StateSpace;
 use crate::moments::Detrend;
-pub(super) use crate::reproduce::data::Failure;
-use crate::reproduce::error::ReproduceError;
+use crate::reproduce::ReproduceError;
+pub(super) use crate::reproduce::data_factor::Failure;
 use crate::systems::ClosedLoop;
 
 /// Windows, length and order.

@@ -5,17 +5,19 @@
 //! |---|---|
 //! | `algorithm` | the algorithms; one run of one of them; its true asymptotic variance |
 //! | `variance` | estimated variances of many runs against the true one |
-//! | `statements` | what the paper says, held against that |
-//! | `one`, `two` | the examples |
+//! | `chiuso_picci_statements` | what the paper says, held against that |
+//! | `variance_study` | what both examples share |
+//! | `first_order_example`, `fifth_order_example` | the examples |
 
 mod algorithm;
-mod one;
-mod statements;
-mod two;
+mod chiuso_picci_statements;
+mod fifth_order_example;
+mod first_order_example;
 mod variance;
+mod variance_study;
 
-pub use one::ChiusoPicciOne;
-pub use two::ChiusoPicciTwo;
+pub use fifth_order_example::ChiusoPicciTwo;
+pub use first_order_example::ChiusoPicciOne;
 
 /// The paper.
 const PAPER: &str =

@@ -3,11 +3,10 @@
 use num_complex::Complex64;
 
 use super::algorithm::{Algorithm, Failure, Found, Windows, algorithms};
-use crate::reproduce::error::ReproduceError;
 use crate::reproduce::figure::{Curve, Figure, Panel, Quantity, Role, Row, Table};
+use crate::reproduce::monte_carlo_runs::{Study, successes};
 use crate::reproduce::statistics::{logarithmic_grid, mean, percentiles};
-use crate::reproduce::study::{Study, successes};
-use crate::reproduce::words;
+use crate::reproduce::{ReproduceError, plain_numbers};
 use crate::systems::ClosedLoop;
 
 /// Points between two of the eight frequencies at which numbers are given.
@@ -200,7 +199,7 @@ impl Plan {
                 .to_owned(),
             rows_are: "Algorithm".to_owned(),
             columns: Self::given()
-                .map(|k| words::number(self.grid[k], 2))
+                .map(|k| plain_numbers::number(self.grid[k], 2))
                 .collect(),
             rows,
             digits: 3,
@@ -212,6 +211,6 @@ impl Plan {
 pub(super) fn failures(outcomes: &[Outcome], runs: usize) -> Vec<String> {
     outcomes
         .iter()
-        .filter_map(|o| words::failures(o.algorithm.name, o.failed, runs))
+        .filter_map(|o| plain_numbers::failures(o.algorithm.name, o.failed, runs))
         .collect()
 }

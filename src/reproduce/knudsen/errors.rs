@@ -2,12 +2,11 @@
 
 use super::SAMPLES;
 use super::methods::{Kind, Method, REFERENCE, bound, methods};
-use crate::reproduce::data::Failure;
-use crate::reproduce::error::ReproduceError;
+use crate::reproduce::data_factor::Failure;
 use crate::reproduce::figure::{BarSeries, Bars, Row, Table, all_finite};
+use crate::reproduce::monte_carlo_runs::{Study, successes};
 use crate::reproduce::statistics::{mean, median, percentiles, root_mean_square};
-use crate::reproduce::study::{Study, successes};
-use crate::reproduce::words;
+use crate::reproduce::{ReproduceError, plain_numbers};
 use crate::systems::KnudsenExample;
 
 /// Bars beyond this many times tk-chol are cut: the paper's y-axes are "truncated" too.
@@ -207,7 +206,7 @@ impl Errors {
     pub(super) fn failures(&self, runs: usize) -> Vec<String> {
         self.outcomes
             .iter()
-            .filter_map(|o| words::failures(o.method.name, o.failed, runs))
+            .filter_map(|o| plain_numbers::failures(o.method.name, o.failed, runs))
             .collect()
     }
 }

@@ -1,12 +1,11 @@
 //! The three experiments: the same study of three systems.
 
 use super::errors::Errors;
-use super::statements::statements;
+use super::knudsen_statements::statements;
 use super::{PAPER, PAPER_RUNS, SAMPLES};
 use crate::reproduce::document::{Fact, Reproduction};
-use crate::reproduce::error::ReproduceError;
-use crate::reproduce::study::Study;
-use crate::reproduce::{Experiment, document_of};
+use crate::reproduce::monte_carlo_runs::Study;
+use crate::reproduce::{Experiment, ReproduceError, document_of};
 use crate::systems::{KnudsenExample, knudsen_armax, knudsen_bj, knudsen_vo};
 
 /// Section 6 of Knudsen for one of its systems.

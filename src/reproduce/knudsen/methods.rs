@@ -4,7 +4,7 @@ use crate::identify::baselines::TableTwo;
 use crate::identify::knudsen::{Decomposition, Regression, ResidualStep, knudsen};
 use crate::identify::pem::{Form, prediction_error_method};
 use crate::log::Log;
-use crate::reproduce::data::{Failure, raw_factor};
+use crate::reproduce::data_factor::{Failure, raw_factor};
 use crate::systems::{KnudsenExample, armax_parameters};
 
 /// What a method is in the comparison.

@@ -5,13 +5,13 @@
 //! |---|---|
 //! | `methods` | the methods, one recording at a time |
 //! | `errors` | errors of the parameters over many recordings |
-//! | `statements` | what the paper says, held against that |
+//! | `knudsen_statements` | what the paper says, held against that |
 //! | `experiment` | the three experiments |
 
 mod errors;
 mod experiment;
+mod knudsen_statements;
 mod methods;
-mod statements;
 
 pub use experiment::{KnudsenExperiment, knudsen_experiments};
 

@@ -3,14 +3,13 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::estimate::{Failure, Response, Setting, Subspace, truth};
+use super::estimation_run::{Failure, Response, Setting, Subspace, truth};
 use super::measure::{Bounds, bounds};
 use crate::covariance::{Path, response_bands};
 use crate::identify::variance::subspace_covariance;
-use crate::reproduce::error::ReproduceError;
 use crate::reproduce::figure::{Curve, Figure, Panel, Quantity, Role, Row, Table};
-use crate::reproduce::study::{Study, successes};
-use crate::reproduce::words;
+use crate::reproduce::monte_carlo_runs::{Study, successes};
+use crate::reproduce::{ReproduceError, plain_numbers};
 use crate::systems::TestSystem;
 use crate::{Options, identify};
 
@@ -238,7 +237,7 @@ impl Outcome {
     pub(super) fn failures(&self) -> Vec<String> {
         self.methods
             .iter()
-            .filter_map(|m| words::failures(m.name, m.failed, self.runs))
+            .filter_map(|m| plain_numbers::failures(m.name, m.failed, self.runs))
             .collect()
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::estimate::Response;
+use super::estimation_run::Response;
 use crate::covariance::{Covariance2, ellipse_quantile, interval_quantile, projected_variance};
 use crate::reproduce::statistics::{mean, mean_with_error, root_mean_square};
 

@@ -2,21 +2,21 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `estimate` | one run: PBSID_opt at the paper's windows, its covariance, its polish |
+//! | `estimation_run` | one run: PBSID_opt at the paper's windows, its covariance, its polish |
 //! | `measure` | how well the bounds of many runs hold |
 //! | `bode` | the Monte Carlo study and its figure, which both examples share |
 //! | `sign` | the sign of the terms beta, by a path-wise check |
-//! | `one`, `two` | the examples |
+//! | `fourth_order_example`, `acoustic_duct_example` | the examples |
 
+mod acoustic_duct_example;
 mod bode;
-mod estimate;
+mod estimation_run;
+mod fourth_order_example;
 mod measure;
-mod one;
 mod sign;
-mod two;
 
-pub use one::VanWingerdenOne;
-pub use two::VanWingerdenTwo;
+pub use acoustic_duct_example::VanWingerdenTwo;
+pub use fourth_order_example::VanWingerdenOne;
 
 /// The paper.
 const PAPER: &str = "J.W. van Wingerden, The asymptotic variance of the PBSIDopt algorithm";

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::estimate::{Failure, Setting, Subspace};
+use super::estimation_run::{Failure, Setting, Subspace};
 use crate::identify::predictor_coefficients;
 use crate::identify::variance::jacobian_with_sign;
 use crate::model::StateSpace;

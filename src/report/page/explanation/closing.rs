@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use super::number::{exact, fixed, number, p_value, percent, share, with_unit};
-use super::source::Source;
-use super::words::{capitalised, effect_name, listed};
+use super::explanation_words::{capitalised, effect_name, listed};
+use super::provenance::Source;
+use super::typeset_number::{exact, fixed, number, p_value, percent, share, with_unit};
 use crate::explain::{Explanation, NoiseFound};
 use crate::log::Channel;
 

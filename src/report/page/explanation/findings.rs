@@ -2,9 +2,11 @@
 
 use serde::Serialize;
 
-use super::number::{fixed, number, p_value, percent, typeset, uncertain, width, with_unit};
+use super::explanation_words::{capitalised, effect_name, listed, port};
 use super::plot::interval;
-use super::words::{capitalised, effect_name, listed, port};
+use super::typeset_number::{
+    fixed, number, p_value, percent, typeset, uncertain, width, with_unit,
+};
 use crate::explain::{EffectFound, Evidence, Explanation, HypothesisVerdict, Verdict};
 
 /// An effect.

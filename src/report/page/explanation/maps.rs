@@ -1,9 +1,9 @@
 //! The pictures over frequency and over the variable of the learned law.
 
-use super::number::fixed;
+use super::explanation_words::{effect_name, listed};
 use super::plot::{Axis, Drawing, Group, Kind, Plot, Series, Shade, interval};
 use super::signals::answers_differ;
-use super::words::{effect_name, listed};
+use super::typeset_number::fixed;
 use crate::explain::{Curve, Explanation, SignalTraces, Verdict};
 
 /// Bands that carry their excess as a label: the strongest.

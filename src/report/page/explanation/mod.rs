@@ -11,19 +11,19 @@
 //! | `explanation.html`, `sections.html` | the templates                                      |
 
 mod closing;
+mod explanation_view;
+mod explanation_words;
 mod findings;
 mod maps;
 mod proof;
 mod signals;
-mod view;
-mod words;
 
 #[cfg(test)]
 pub(crate) mod fixtures;
 #[cfg(test)]
 mod tests;
 
-use super::{PageError, head, number, plot, render, source};
+use super::{PageError, head, plot, provenance, render, typeset_number};
 use crate::explain::Explanation;
 
 const TEMPLATES: [(&str, &str); 2] = [
@@ -38,5 +38,5 @@ const TEMPLATES: [(&str, &str); 2] = [
 /// # Errors
 /// When the template cannot be filled, which no explanation should bring about.
 pub fn explanation_page(explanation: &Explanation) -> Result<String, PageError> {
-    render(&TEMPLATES, &view::view(explanation))
+    render(&TEMPLATES, &explanation_view::view(explanation))
 }

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use super::number::{fixed, number, share, with_unit};
+use super::explanation_words::capitalised;
 use super::plot::interval;
 use super::signals::augmented_name;
-use super::words::capitalised;
+use super::typeset_number::{fixed, number, share, with_unit};
 use crate::explain::{Explanation, FitFigure, FitSteps, Verdict};
 
 /// Everything about the fit.

@@ -10,17 +10,17 @@
 //! | `recording`  | the recordings and what excites the plant                    |
 //! | `identification.html` | the template                                        |
 
-mod order;
-mod poles;
-mod recording;
-mod residuals;
-mod response;
-mod view;
+mod identification_view;
+mod order_plots;
+mod pole_zero_map;
+mod recording_plots;
+mod residual_plots;
+mod response_plots;
 
 #[cfg(test)]
 mod tests;
 
-use super::{PageError, head, number, plot, render, source};
+use super::{PageError, head, plot, provenance, render, typeset_number};
 use crate::identify::Model;
 use crate::report::Overview;
 use crate::validate::Validation;
@@ -43,7 +43,10 @@ pub fn identification_page(
     tests: Option<&Validation>,
     overview: Option<&Overview>,
 ) -> Result<String, PageError> {
-    render(&TEMPLATES, &view::view(model, tests, overview)?)
+    render(
+        &TEMPLATES,
+        &identification_view::view(model, tests, overview)?,
+    )
 }
 
 /// Groups beyond [`SHOWN`] are folded away.

@@ -6,13 +6,13 @@
 //! | `pictures`   | outputs, inputs and residuals over time; autocorrelations       |
 //! | `plant.html` | the template                                                    |
 
-mod pictures;
-mod view;
+mod plant_plots;
+mod plant_view;
 
 #[cfg(test)]
 mod tests;
 
-use super::{PageError, head, number, plot, render, source};
+use super::{PageError, head, plot, provenance, render, typeset_number};
 use crate::physics::Plant;
 use crate::physics::estimate::{Evaluation, PlantRecording};
 use crate::report::PlantDocument;
@@ -33,5 +33,8 @@ pub fn plant_page(
     records: &[PlantRecording],
     found: &Evaluation,
 ) -> Result<String, PageError> {
-    render(&TEMPLATES, &view::view(plant, document, records, found))
+    render(
+        &TEMPLATES,
+        &plant_view::view(plant, document, records, found),
+    )
 }

@@ -6,13 +6,13 @@
 //! | `pictures` | lines and bars |
 //! | `reproduction.html` | the template |
 
-mod pictures;
-mod view;
+mod reproduction_plots;
+mod reproduction_view;
 
 #[cfg(test)]
 mod tests;
 
-use super::{PageError, head, number, plot, render};
+use super::{PageError, head, plot, render, typeset_number};
 use crate::reproduce::Reproduction;
 
 const TEMPLATES: [(&str, &str); 1] = [("reproduction", include_str!("reproduction.html"))];
@@ -22,5 +22,5 @@ const TEMPLATES: [(&str, &str); 1] = [("reproduction", include_str!("reproductio
 /// # Errors
 /// When the template cannot be filled, which no reproduction should bring about.
 pub fn reproduction_page(reproduction: &Reproduction) -> Result<String, PageError> {
-    render(&TEMPLATES, &view::view(reproduction))
+    render(&TEMPLATES, &reproduction_view::view(reproduction))
 }

@@ -1,0 +1,174 @@
+//! `innovant simulate` of a plant in equations.
+
+use std::path::Path;
+
+use super::load_plant::{
+    LoadedPlant, all_known, assignments, load, read_recordings, set_parameters, set_start,
+    tell_warnings,
+};
+use crate::cli::flags::RoleFlags;
+use crate::cli::terminal::note;
+use crate::cli::{Outcome, Verbosity};
+use crate::log::{Channel, RoleNeed, Source, write_table};
+use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
+use crate::physics::{Excitation, Hold, Point};
+use crate::report::{PlantDocument, is_plant};
+
+/// Where the states start.
+#[derive(Debug, Clone)]
+pub(crate) enum Start {
+    /// Values of the text.
+    Text,
+    /// All zero.
+    Zero,
+    /// Those that fit the recorded outputs best.
+    Estimate,
+    /// Some of them by name.
+    Given(String),
+}
+
+/// What is asked of a plant.
+pub(crate) struct PlantRun<'a> {
+    pub plant: &'a Path,
+    pub input: &'a Source,
+    pub roles: &'a RoleFlags,
+    pub parameters: Option<&'a str>,
+    pub start: Start,
+    pub hold: Option<Hold>,
+    pub output: &'a Path,
+}
+
+pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
+    let loaded = load(asked.plant)?;
+    tell_warnings(&loaded, say);
+    let LoadedPlant {
+        plant,
+        mut point,
+        hold,
+        document,
+        explanation,
+        ..
+    } = loaded;
+    let hold = asked.hold.unwrap_or(hold);
+    if let Some(text) = asked.parameters {
+        parameters(&plant, &mut point, text)?;
+        tell_out_of_bounds(&plant, &point, say);
+    }
+    let estimated = matches!(asked.start, Start::Estimate);
+    let need = if estimated {
+        RoleNeed::Identify
+    } else {
+        RoleNeed::InputsOnly
+    };
+    let (mut logs, _) = read_recordings(
+        &plant,
+        std::slice::from_ref(asked.input),
+        asked.roles,
+        need,
+        say,
+    )?;
+    if logs.len() != 1 {
+        anyhow::bail!(
+            "{}: samples are missing in the middle; a simulation needs one without gaps (--missing interpolate)",
+            asked.input
+        );
+    }
+    let log = logs.remove(0);
+    if let Some(explanation) = &explanation
+        && let Some(found) = &explanation.plant
+        && !all_known(&explanation.recordings, std::slice::from_ref(&log))
+    {
+        let before = log.start_time - log.sample_time;
+        let times = found.times_of_change.iter();
+        let changed: Vec<(String, f64)> = times.map(|name| (name.clone(), before)).collect();
+        set_parameters(&plant, &mut point, &changed)?;
+    }
+    match &asked.start {
+        Start::Text => {
+            // On a recording that it was estimated from, a plant starts where that was found to start.
+            let known = document
+                .iter()
+                .flat_map(|d| d.recordings.iter().zip(&d.initial_states));
+            for (_, states) in known.filter(|(r, _)| {
+                r.sha256.is_some() && r.sha256 == log.sha256 && r.start_time == log.start_time
+            }) {
+                let values: Vec<(String, f64)> =
+                    states.iter().map(|s| (s.name.clone(), s.value)).collect();
+                set_start(&plant, &mut point, &values)?;
+            }
+        }
+        Start::Zero => point.start.fill(Some(0.0)),
+        Start::Given(text) => {
+            set_start(&plant, &mut point, &assignments("--initial-state", text)?)?
+        }
+        Start::Estimate => {
+            let options = EstimateOptions {
+                free: vec![false; point.parameters.len()],
+                hold,
+                form: Some(Form::FreeRun),
+                least_squares: true,
+            };
+            let at_values = plant.with_values(&point.parameters);
+            let found = estimate(&at_values, &[PlantRecording::from(&log)], &options)?;
+            point.start = found.points[0].start.clone();
+        }
+    }
+    let inputs: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
+    let excitation = Excitation {
+        inputs: &inputs,
+        length: log.samples(),
+        sample_time: log.sample_time,
+        start_time: log.start_time,
+        hold,
+    };
+    let run = plant
+        .simulate(&point, &excitation, None)
+        .map_err(|e| anyhow::anyhow!("{}: {e}", asked.plant.display()))?;
+    let declared = plant.spec.outputs().into_iter().map(|v| Channel {
+        name: plant.spec.variable(v).column().to_owned(),
+        unit: plant.spec.variable(v).unit_text.clone(),
+    });
+    let found = explanation.and_then(|e| e.plant);
+    let named: Vec<Channel> = found.map_or_else(|| declared.collect(), |p| p.outputs);
+    let columns: Vec<(&Channel, &[f64])> = named
+        .iter()
+        .zip(run.outputs.iter().map(Vec::as_slice))
+        .collect();
+    write_table(asked.output, log.sample_time, log.start_time, &columns)?;
+    Ok(Outcome::Done)
+}
+
+/// Says on standard error which values are outside the bounds of the text: a simulation may use them.
+fn tell_out_of_bounds(plant: &crate::physics::Plant, point: &Point, say: Verbosity) {
+    for (&v, value) in plant.spec.parameters().iter().zip(&point.parameters) {
+        let v = plant.spec.variable(v);
+        if !(v.min..=v.max).contains(value) && !say.quiet {
+            let name = v.column();
+            note(&format!(
+                "warning: --parameters: {name} = {value} is outside its bounds in the text, {} to {}; it is used all the same\n",
+                v.min, v.max
+            ));
+        }
+    }
+}
+
+/// Values by name, or those of a plant that was estimated.
+fn parameters(plant: &crate::physics::Plant, point: &mut Point, text: &str) -> anyhow::Result<()> {
+    if text.contains('=') {
+        return set_parameters(plant, point, &assignments("--parameters", text)?);
+    }
+    let document = std::fs::read_to_string(text).map_err(|e| {
+        anyhow::anyhow!(
+            "--parameters: {text} is neither `name=value` nor a file that can be read: {e}"
+        )
+    })?;
+    if !is_plant(&document) {
+        anyhow::bail!("--parameters: {text} is not what `innovant identify --structure` writes");
+    }
+    let values: Vec<(String, f64)> = PlantDocument::parse(text, &document)?
+        .parameters
+        .into_iter()
+        .map(|p| (p.name, p.value))
+        .collect();
+    set_parameters(plant, point, &values)
+}
