@@ -228,12 +228,12 @@ pub(super) fn rank_of(spec: &ModelSpec, term: &Term, place: Place, variables: &[
     let (of_place, elsewhere) = match place {
         Place::Equation(at) => {
             let own = place.variable(spec);
+            let from_outside =
+                term.needs == Needs::Time || variables.iter().any(|&v| unused(spec, v));
             let elsewhere = match spec.equations[at].unknown {
                 _ if variables.contains(&own) || term.port != Port::Equation => 0,
-                // A load acts on what moves, before what drives it.
-                Unknown::Derivative(v) if term.needs == Needs::Time && !is_velocity(spec, &[v]) => {
-                    2
-                }
+                // A load, and an input that nothing else uses, act on what moves, before what drives it.
+                Unknown::Derivative(v) if from_outside && !is_velocity(spec, &[v]) => 2,
                 Unknown::Derivative(_) => 1,
                 Unknown::Value(_) if spec.variable(own).output => 2,
                 Unknown::Value(_) => 3,

@@ -217,14 +217,15 @@ fn improved(stage: &Stage, fitted: &[Fitted]) -> Option<Fit> {
 }
 
 /// Whether a term may be named beside an effect. It must have a name of its own: a function without a name may be what is left of
-/// the first; and it must not be a function of the same variables inside the plant, which may be the part that the formula of
-/// the first leaves (math/physics.md, "Fits and decision", 8).
+/// the first; and it must not be a function of the same variables at the same kind of place, which may be the part that the
+/// formula of the first leaves (math/physics.md, "Fits and decision", 8).
 fn differs(id: &str, port: Port, depends: &[String], (first, its_id): (&Fitted, &str)) -> bool {
-    let inside = |port: Port| matches!(port, Port::Equation | Port::Parameter);
-    let repeats = !depends.is_empty()
-        && depends == first.depends
-        && inside(port)
-        && inside(first.lead.term.port);
+    let kind = |port: Port| match port {
+        Port::Equation | Port::Parameter => Port::Equation,
+        port => port,
+    };
+    let repeats =
+        !depends.is_empty() && depends == first.depends && kind(port) == kind(first.lead.term.port);
     !matches!(id, "law" | "cross_coupling" | "viscous_friction")
         && family(id) != family(its_id)
         && !repeats
