@@ -4,14 +4,16 @@ use std::path::Path;
 
 use super::output::note;
 use super::plant::{
-    LoadedPlant, assignments, load, read_recordings, set_parameters, set_start, tell_warnings,
+    LoadedPlant, assignments, load, read_recordings, read_with, set_parameters, set_start,
+    tell_warnings,
 };
 use super::roles::RoleFlags;
 use super::validate::all_known;
 use super::{Outcome, Verbosity};
-use crate::log::{Channel, RoleNeed, Source, write_table};
+use crate::explain::AugmentedPlant;
+use crate::log::{Channel, Log, RoleNeed, Roles, Source, write_table};
 use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
-use crate::physics::{Excitation, Hold, Point};
+use crate::physics::{Excitation, Hold, Plant, Point, parse};
 use crate::report::{PlantDocument, is_plant};
 
 /// Where the states start.
@@ -35,6 +37,8 @@ pub(super) struct PlantRun<'a> {
     pub parameters: Option<&'a str>,
     pub start: Start,
     pub hold: Option<Hold>,
+    /// Answer of the original simulator to this input.
+    pub simulation: Option<&'a Path>,
     pub output: &'a Path,
 }
 
@@ -113,6 +117,23 @@ pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
             point.start = found.points[0].start.clone();
         }
     }
+    let beside = match asked.simulation {
+        Some(file) => {
+            let found = explanation.as_ref().and_then(|e| e.plant.as_ref());
+            let Some((found, text)) = found.and_then(|f| Some((f, f.simulation.as_ref()?))) else {
+                anyhow::bail!(
+                    "{}: --simulation belongs to an explanation of simulated columns, and this plant was given as equations; leave \
+                     it out",
+                    asked.plant.display()
+                );
+            };
+            Some(original(text, found, file, &log, hold, asked.roles, say)?)
+        }
+        None => None,
+    };
+    if let (Some(original), Start::Text) = (&beside, &asked.start) {
+        set_start(&plant, &mut point, &original.start)?;
+    }
     let inputs: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
     let excitation = Excitation {
         inputs: &inputs,
@@ -121,9 +142,14 @@ pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         start_time: log.start_time,
         hold,
     };
-    let run = plant
+    let mut run = plant
         .simulate(&point, &excitation, None)
         .map_err(|e| anyhow::anyhow!("{}: {e}", asked.plant.display()))?;
+    if let Some(original) = &beside {
+        for (y, rest) in run.outputs.iter_mut().zip(&original.remainder) {
+            y.iter_mut().zip(rest).for_each(|(y, rest)| *y += rest);
+        }
+    }
     let declared = plant.spec.outputs().into_iter().map(|v| Channel {
         name: plant.spec.variable(v).column().to_owned(),
         unit: plant.spec.variable(v).unit_text.clone(),
@@ -136,6 +162,78 @@ pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         .collect();
     write_table(asked.output, log.sample_time, log.start_time, &columns)?;
     Ok(Outcome::Done)
+}
+
+/// The equations of a simulator beside its answer to an input.
+struct Original {
+    /// Where its states start.
+    start: Vec<(String, f64)>,
+    /// Simulated outputs less those of the equations.
+    remainder: Vec<Vec<f64>>,
+}
+
+/// Finds where the simulator started, and what its equations miss of its answer.
+fn original(
+    text: &str,
+    found: &AugmentedPlant,
+    file: &Path,
+    log: &Log,
+    hold: Hold,
+    roles: &RoleFlags,
+    say: Verbosity,
+) -> anyhow::Result<Original> {
+    let outputs: Vec<String> = found.outputs.iter().map(|c| c.name.clone()).collect();
+    let roles = Roles {
+        inputs: None,
+        outputs: Some(outputs),
+        ..roles.clone().roles()
+    };
+    let source = Source::from(file.to_owned());
+    let (simulated, _) = read_with(&roles, &[source], RoleNeed::OutputsOnly, say)?;
+    let simulated = match simulated.as_slice() {
+        [one] if one.samples() == log.samples() => one,
+        other => anyhow::bail!(
+            "{}: {} samples, and {} has {}; give the simulator's answer to exactly this input",
+            file.display(),
+            other.iter().map(Log::samples).sum::<usize>(),
+            log.name,
+            log.samples()
+        ),
+    };
+    let plant = Plant::new(
+        parse(text).map_err(|e| anyhow::anyhow!("{}", e.render("plant.simulation", text)))?,
+    );
+    let recording = PlantRecording {
+        outputs: simulated.output_data.clone(),
+        ..PlantRecording::from(log)
+    };
+    let options = EstimateOptions {
+        free: vec![false; plant.spec.parameters().len()],
+        hold,
+        form: Some(Form::FreeRun),
+        least_squares: true,
+    };
+    let fitted = estimate(&plant, std::slice::from_ref(&recording), &options)?;
+    let point = &fitted.points[0];
+    let inputs: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
+    let excitation = Excitation {
+        inputs: &inputs,
+        length: log.samples(),
+        sample_time: log.sample_time,
+        start_time: log.start_time,
+        hold,
+    };
+    let run = plant.simulate(point, &excitation, None)?;
+    let remainder = recording.outputs.iter().zip(&run.outputs);
+    let states = plant.spec.states().into_iter().zip(&point.start);
+    Ok(Original {
+        start: states
+            .filter_map(|(v, start)| Some((plant.spec.variable(v).column().to_owned(), (*start)?)))
+            .collect(),
+        remainder: remainder
+            .map(|(y, own)| y.iter().zip(own).map(|(y, own)| y - own).collect())
+            .collect(),
+    })
 }
 
 /// Says on standard error which values are outside the bounds of the text: a simulation may use them.

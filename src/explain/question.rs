@@ -3,7 +3,9 @@
 use super::adequacy::LEVEL;
 use super::answer::Answer;
 use super::check::Checked;
+use super::columns;
 use super::data::Data;
+use super::doubt::{doubt, follows_closer};
 use super::effects::{self, Definition};
 use super::error::ExplainError;
 use super::explanation::{Explanation, Verdict};
@@ -53,7 +55,19 @@ pub fn explain(
     // The data before the physics: from here on they are as repaired.
     let checked = Checked::new(recordings, simulation, &allowed_id);
     let recordings = checked.recordings.as_slice();
-    let known = know(&checked)?;
+    let known = know(&checked);
+    // Data that were repaired are left to the search that knows how.
+    let by_equations = || {
+        let whole = checked.troubles.is_empty();
+        whole
+            .then(|| columns::attempt(&checked, &options.without))
+            .flatten()
+    };
+    let linear = known.as_ref().is_ok_and(|k| !k.relative);
+    if !linear && let Some(explanation) = by_equations() {
+        return Ok(explanation);
+    }
+    let known = known?;
     let drive = weak::attempt(recordings, &known, &allowed);
     // What a law in the averaged equation of a drive explains to noise needs no other way, and the rest little. Where no law
     // was found, the equation may be blind to what there is (effects of the sensor, another mode), and where a spring
@@ -86,14 +100,23 @@ pub fn explain(
         }
     };
     finding.add(checked.troubles.clone());
-    Ok(Answer {
+    let mut explanation = Answer {
         recordings,
         known: &known,
         finding: &finding,
         mask,
         seed: options.seed,
     }
-    .say())
+    .say();
+    if !linear {
+        doubt(&mut explanation);
+    }
+    let settled =
+        !linear || explanation.remaining.adequate && explanation.verdict != Verdict::Unexplained;
+    Ok(match (!settled).then(by_equations).flatten() {
+        Some(other) if follows_closer(&other, &explanation) => other,
+        _ => explanation,
+    })
 }
 
 /// Whether the finding is an averaged equation of what is no drive, but a mass on a spring.

@@ -294,6 +294,7 @@ impl Answer<'_> {
                     .plant
                     .text_at(&self.whole.points(&self.found.fit)[0]),
                 outputs: self.channels.clone(),
+                simulation: None,
                 times_of_change: self.times_of_change(),
                 hold: if self.hold == Hold::Zero {
                     "zero"

@@ -179,6 +179,11 @@ impl<'a> Study<'a> {
         self.problem.recordings.iter().map(of).fold(0.0, f64::max)
     }
 
+    /// Parameters and initial states as the text has them.
+    pub fn nominal(&self) -> Vec<f64> {
+        self.problem.nominal()
+    }
+
     /// Number of free parameters.
     pub fn parameters(&self) -> usize {
         self.problem.free.len()
