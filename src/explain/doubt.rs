@@ -1,13 +1,10 @@
-//! Which of two explanations of simulated columns speaks, and what is taken back where the simulator is not understood.
+//! What is taken back from an explanation of simulated columns where the simulator is not understood.
 
 use super::explanation::{Explanation, Verdict};
 
 /// An effect beside a simulator that is neither linear nor reproduced by equations must take this part off the mean square of the
 /// error in blocks left out: more is explained than is not.
 const MOST: f64 = 0.5;
-/// Free runs whose errors differ by less than this part are equally good (the tolerance of the project's score on real
-/// recordings).
-const EQUAL: f64 = 0.02;
 
 /// Takes back what is not sure where the simulator's own nonlinearity is not known: its parameters may differ, and what they do
 /// then looks like an effect.
@@ -36,14 +33,6 @@ pub(crate) fn doubt(explanation: &mut Explanation) {
     );
 }
 
-/// Whether one explanation names something, and its free run follows the recording closer than that of the other.
-pub(crate) fn follows_closer(one: &Explanation, other: &Explanation) -> bool {
-    let error = |e: &Explanation| e.fit.train.augmented.rmse;
-    one.verdict == Verdict::Named
-        && one.fit.output == other.fit.output
-        && error(one) < (1.0 - EQUAL) * error(other)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -61,7 +50,7 @@ mod tests {
     }
 
     #[test]
-    fn the_better_explanation_speaks_and_what_is_not_sure_is_taken_back() {
+    fn what_is_not_sure_is_taken_back() {
         let named = drag();
         let judged = |without: f64, with: f64| {
             let mut e = with_errors(&named, without, with);
@@ -75,13 +64,5 @@ mod tests {
         structure.remaining.adequate = false;
         doubt(&mut structure);
         assert_eq!(structure.verdict, Verdict::Unexplained);
-
-        let mut far = named.clone();
-        far.fit.train.augmented.rmse *= 2.0;
-        assert!(follows_closer(&named, &far) && !follows_closer(&far, &named));
-        assert!(!follows_closer(&named, &named));
-        let mut nameless = named;
-        nameless.verdict = Verdict::Unexplained;
-        assert!(!follows_closer(&nameless, &far));
     }
 }

@@ -5,7 +5,7 @@ use super::answer::Answer;
 use super::check::Checked;
 use super::columns;
 use super::data::Data;
-use super::doubt::{doubt, follows_closer};
+use super::doubt::doubt;
 use super::effects::{self, Definition};
 use super::error::ExplainError;
 use super::explanation::{Explanation, Verdict};
@@ -56,15 +56,13 @@ pub fn explain(
     let checked = Checked::new(recordings, simulation, &allowed_id);
     let recordings = checked.recordings.as_slice();
     let known = know(&checked);
-    // Data that were repaired are left to the search that knows how.
-    let by_equations = || {
-        let whole = checked.troubles.is_empty();
-        whole
-            .then(|| columns::attempt(&checked, &options.without))
-            .flatten()
-    };
+    // Equations in place of columns of a simulator that is not linear. Data that were repaired are left to the search that knows
+    // how.
     let linear = known.as_ref().is_ok_and(|k| !k.relative);
-    if !linear && let Some(explanation) = by_equations() {
+    if !linear
+        && checked.troubles.is_empty()
+        && let Some(explanation) = columns::attempt(&checked, &options.without)
+    {
         return Ok(explanation);
     }
     let known = known?;
@@ -111,12 +109,7 @@ pub fn explain(
     if !linear {
         doubt(&mut explanation);
     }
-    let settled =
-        !linear || explanation.remaining.adequate && explanation.verdict != Verdict::Unexplained;
-    Ok(match (!settled).then(by_equations).flatten() {
-        Some(other) if follows_closer(&other, &explanation) => other,
-        _ => explanation,
-    })
+    Ok(explanation)
 }
 
 /// Whether the finding is an averaged equation of what is no drive, but a mass on a spring.
