@@ -5,7 +5,7 @@ use super::answer::Answer;
 use super::check::Checked;
 use super::columns;
 use super::data::Data;
-use super::doubt::doubt;
+use super::doubt::{doubt, is_doubtful, stands_in};
 use super::effects::{self, Definition};
 use super::error::ExplainError;
 use super::explanation::{Explanation, Verdict};
@@ -55,17 +55,8 @@ pub fn explain(
     // The data before the physics: from here on they are as repaired.
     let checked = Checked::new(recordings, simulation, &allowed_id);
     let recordings = checked.recordings.as_slice();
-    let known = know(&checked);
-    // Equations in place of columns of a simulator that is not linear. Data that were repaired are left to the search that knows
-    // how.
-    let linear = known.as_ref().is_ok_and(|k| !k.relative);
-    if !linear
-        && checked.troubles.is_empty()
-        && let Some(explanation) = columns::attempt(&checked, &options.without)
-    {
-        return Ok(explanation);
-    }
-    let known = known?;
+    let known = know(&checked)?;
+    let relative = known.relative;
     let drive = weak::attempt(recordings, &known, &allowed);
     // What a law in the averaged equation of a drive explains to noise needs no other way, and the rest little. Where no law
     // was found, the equation may be blind to what there is (effects of the sensor, another mode), and where a spring
@@ -106,10 +97,24 @@ pub fn explain(
         seed: options.seed,
     }
     .say();
-    if !linear {
-        doubt(&mut explanation);
+    // What no linear model reproduces is first explained relative to the simulated columns, which are exact. Only where that
+    // answer is doubtful are equations looked for that reproduce the columns, whose parameters can then be fitted too; data
+    // that were repaired are left to the search that knows how. The better answer is given, by its free run.
+    if !relative || !is_doubtful(&explanation) {
+        return Ok(explanation);
     }
-    Ok(explanation)
+    let equations = checked
+        .troubles
+        .is_empty()
+        .then(|| columns::attempt(&checked, &options.without))
+        .flatten();
+    Ok(match equations {
+        Some(equations) if stands_in(&equations, &explanation) => equations,
+        _ => {
+            doubt(&mut explanation);
+            explanation
+        }
+    })
 }
 
 /// Whether the finding is an averaged equation of what is no drive, but a mass on a spring.
