@@ -11,9 +11,9 @@ use super::roles::RoleFlags;
 use super::validate::all_known;
 use super::{Outcome, Verbosity};
 use crate::explain::AugmentedPlant;
-use crate::log::{Channel, Log, RoleNeed, Roles, Source, write_table};
+use crate::log::{Channel, RoleNeed, Roles, Source, write_table};
 use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
-use crate::physics::{Excitation, Hold, Plant, Point, parse};
+use crate::physics::{Excitation, Hold, Point};
 use crate::report::{PlantDocument, is_plant};
 
 /// Where the states start.
@@ -120,14 +120,23 @@ pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
     let beside = match asked.simulation {
         Some(file) => {
             let found = explanation.as_ref().and_then(|e| e.plant.as_ref());
-            let Some((found, text)) = found.and_then(|f| Some((f, f.simulation.as_ref()?))) else {
+            let original = found
+                .map(|found| {
+                    let simulated = simulated(found, file, asked.roles, say)?;
+                    found
+                        .original(&log, &simulated, hold)
+                        .map_err(|e| anyhow::anyhow!("{}: {e}", file.display()))
+                })
+                .transpose()?
+                .flatten();
+            if original.is_none() {
                 anyhow::bail!(
                     "{}: --simulation belongs to an explanation of simulated columns, and this plant was given as equations; leave \
                      it out",
                     asked.plant.display()
                 );
-            };
-            Some(original(text, found, file, &log, hold, asked.roles, say)?)
+            }
+            original
         }
         None => None,
     };
@@ -164,24 +173,13 @@ pub(super) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The equations of a simulator beside its answer to an input.
-struct Original {
-    /// Where its states start.
-    start: Vec<(String, f64)>,
-    /// Simulated outputs less those of the equations.
-    remainder: Vec<Vec<f64>>,
-}
-
-/// Finds where the simulator started, and what its equations miss of its answer.
-fn original(
-    text: &str,
+/// The simulator's answer to one input.
+fn simulated(
     found: &AugmentedPlant,
     file: &Path,
-    log: &Log,
-    hold: Hold,
     roles: &RoleFlags,
     say: Verbosity,
-) -> anyhow::Result<Original> {
+) -> anyhow::Result<Vec<Vec<f64>>> {
     let outputs: Vec<String> = found.outputs.iter().map(|c| c.name.clone()).collect();
     let roles = Roles {
         inputs: None,
@@ -189,51 +187,14 @@ fn original(
         ..roles.clone().roles()
     };
     let source = Source::from(file.to_owned());
-    let (simulated, _) = read_with(&roles, &[source], RoleNeed::OutputsOnly, say)?;
-    let simulated = match simulated.as_slice() {
-        [one] if one.samples() == log.samples() => one,
-        other => anyhow::bail!(
-            "{}: {} samples, and {} has {}; give the simulator's answer to exactly this input",
-            file.display(),
-            other.iter().map(Log::samples).sum::<usize>(),
-            log.name,
-            log.samples()
-        ),
-    };
-    let plant = Plant::new(
-        parse(text).map_err(|e| anyhow::anyhow!("{}", e.render("plant.simulation", text)))?,
-    );
-    let recording = PlantRecording {
-        outputs: simulated.output_data.clone(),
-        ..PlantRecording::from(log)
-    };
-    let options = EstimateOptions {
-        free: vec![false; plant.spec.parameters().len()],
-        hold,
-        form: Some(Form::FreeRun),
-        least_squares: true,
-    };
-    let fitted = estimate(&plant, std::slice::from_ref(&recording), &options)?;
-    let point = &fitted.points[0];
-    let inputs: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
-    let excitation = Excitation {
-        inputs: &inputs,
-        length: log.samples(),
-        sample_time: log.sample_time,
-        start_time: log.start_time,
-        hold,
-    };
-    let run = plant.simulate(point, &excitation, None)?;
-    let remainder = recording.outputs.iter().zip(&run.outputs);
-    let states = plant.spec.states().into_iter().zip(&point.start);
-    Ok(Original {
-        start: states
-            .filter_map(|(v, start)| Some((plant.spec.variable(v).column().to_owned(), (*start)?)))
-            .collect(),
-        remainder: remainder
-            .map(|(y, own)| y.iter().zip(own).map(|(y, own)| y - own).collect())
-            .collect(),
-    })
+    let (mut logs, _) = read_with(&roles, &[source], RoleNeed::OutputsOnly, say)?;
+    if logs.len() != 1 {
+        anyhow::bail!(
+            "{}: samples are missing in the middle; give the simulator's answer without gaps",
+            file.display()
+        );
+    }
+    Ok(logs.remove(0).output_data)
 }
 
 /// Says on standard error which values are outside the bounds of the text: a simulation may use them.

@@ -89,6 +89,8 @@ pub use explanation::{
     NoiseFound, ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces,
     StatePrior, Verdict,
 };
-pub use plant_answer::{PlantOptions, PlantQuestionError, explain_plant};
+pub use plant_answer::{
+    AugmentedPlantError, Original, PlantOptions, PlantQuestionError, explain_plant,
+};
 pub use question::{Options, explain};
 pub use simulation::Simulation;

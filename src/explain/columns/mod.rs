@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use self::chain::{Chains, Column};
 use self::eliminate::eliminate;
 use self::regression::{OutputEquation, output_equation};
-use self::signals::Signals;
+use self::signals::{Regressors, Signals};
 use crate::log::Channel;
 use crate::noise::{Noise, Series};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
@@ -132,53 +132,45 @@ impl Columns<'_> {
     /// Tries combinations of orders from few states to many.
     fn best(&self) -> Option<Fitted> {
         let all = combinations(self.signals.outputs);
-        let highest = all.iter().flatten().copied().max()?;
-        let regressors: Vec<_> = (0..=highest.max(1))
-            .into_par_iter()
-            .map(|order| self.signals.regressors(order))
-            .collect();
-        let mut equations: Vec<(usize, f64, Vec<OutputEquation>)> = all
-            .into_par_iter()
-            .filter_map(|orders| {
-                let highest = orders.iter().copied().max()?.max(1);
-                let regressors = regressors[highest].as_ref()?;
-                let each: Vec<OutputEquation> = (0..orders.len())
-                    .map(|j| output_equation(&self.signals, regressors, j, &orders))
-                    .collect();
-                let worst = each.iter().map(|e| e.error).fold(0.0, f64::max);
-                (worst < HOPELESS).then(|| (orders.iter().sum(), worst, each))
-            })
-            .collect();
-        let terms = |each: &[OutputEquation]| each.iter().map(|e| e.terms.len()).sum::<usize>();
-        equations.sort_by(|a, b| {
-            let error = |e: f64| e.max(CLOSE);
-            a.0.cmp(&b.0)
-                .then(error(a.1).total_cmp(&error(b.1)))
-                .then(terms(&a.2).cmp(&terms(&b.2)))
-        });
+        // Of each highest order.
+        let mut regressors: Vec<Option<Regressors>> = Vec::new();
         let mut best: Option<Fitted> = None;
-        let (mut states, mut tried) = (0, 0);
-        for (size, _, each) in equations {
-            if size != states {
-                (states, tried) = (size, 0);
-                if best.as_ref().is_some_and(|b| b.misfit <= REPRODUCED) {
-                    break;
+        for states in 1..=MOST_STATES {
+            while regressors.len() < states.min(MOST_IN_A_CHAIN) {
+                regressors.push(self.signals.regressors(regressors.len() + 1));
+            }
+            let of_size = all.par_iter().filter(|o| o.iter().sum::<usize>() == states);
+            let mut equations: Vec<(f64, Vec<OutputEquation>)> = of_size
+                .filter_map(|orders| {
+                    let highest = orders.iter().copied().max()?;
+                    let regressors = regressors.get(highest.checked_sub(1)?)?.as_ref()?;
+                    let each: Vec<OutputEquation> = (0..orders.len())
+                        .map(|j| output_equation(&self.signals, regressors, j, orders))
+                        .collect();
+                    let worst = each.iter().map(|e| e.error).fold(0.0, f64::max);
+                    (worst < HOPELESS).then_some((worst, each))
+                })
+                .collect();
+            let terms = |each: &[OutputEquation]| each.iter().map(|e| e.terms.len()).sum::<usize>();
+            equations.sort_by(|a, b| {
+                let by_error = a.0.max(CLOSE).total_cmp(&b.0.max(CLOSE));
+                by_error.then(terms(&a.1).cmp(&terms(&b.1)))
+            });
+            for (_, each) in equations.iter().take(SIMULATED) {
+                let found = Chains::new(&self.signals, each).and_then(|c| self.fitted(c));
+                let Some(found) = found.map(|f| self.reduced(f)) else {
+                    continue;
+                };
+                let better = |b: &Fitted| match b.misfit.max(found.misfit) <= REPRODUCED {
+                    true => found.chains.terms.len() < b.chains.terms.len(),
+                    false => found.misfit < b.misfit,
+                };
+                if best.as_ref().is_none_or(better) {
+                    best = Some(found);
                 }
             }
-            tried += 1;
-            if tried > SIMULATED {
-                continue;
-            }
-            let found = Chains::new(&self.signals, &each).and_then(|c| self.fitted(c));
-            let Some(found) = found.map(|f| self.reduced(f)) else {
-                continue;
-            };
-            let better = |b: &Fitted| match b.misfit.max(found.misfit) <= REPRODUCED {
-                true => found.chains.terms.len() < b.chains.terms.len(),
-                false => found.misfit < b.misfit,
-            };
-            if best.as_ref().is_none_or(better) {
-                best = Some(found);
+            if best.as_ref().is_some_and(|b| b.misfit <= REPRODUCED) {
+                break;
             }
         }
         best

@@ -30,8 +30,32 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
+fn less(v: &mut [f64], q: &[f64]) {
+    let along = dot(v, q);
+    v.iter_mut().zip(q).for_each(|(v, q)| *v -= along * q);
+}
+
+/// What is left of a column beside orthonormal ones. Twice is enough (Giraud, Langou and Rozloznik, *Numerische Mathematik* 101,
+/// 2005).
+fn beside(column: &[f64], orthonormal: &[Vec<f64>]) -> Vec<f64> {
+    let mut v = column.to_vec();
+    for _ in 0..2 {
+        orthonormal.iter().for_each(|q| less(&mut v, q));
+    }
+    v
+}
+
+/// At unit length; none where the column was dependent on what was subtracted from it.
+fn unit(mut v: Vec<f64>) -> Option<Vec<f64>> {
+    let length = dot(&v, &v).sqrt();
+    if length.is_nan() || length < DEPENDENT {
+        return None;
+    }
+    v.iter_mut().for_each(|v| *v /= length);
+    Some(v)
+}
+
 /// Columns orthogonalised one after the other, with what is left of a target.
-#[derive(Clone)]
 struct Basis<'a> {
     regressors: &'a Regressors,
     orthonormal: Vec<Vec<f64>>,
@@ -40,34 +64,46 @@ struct Basis<'a> {
     rest: Vec<f64>,
 }
 
-impl Basis<'_> {
-    fn add(&mut self, column: usize) {
-        let mut v = self.regressors.columns[column].clone();
-        // Twice is enough (Giraud, Langou and Rozloznik, Numerische Mathematik 101, 2005).
-        for _ in 0..2 {
-            for q in &self.orthonormal {
-                let along = dot(&v, q);
-                v.iter_mut().zip(q).for_each(|(v, q)| *v -= along * q);
+/// What a function adds to a basis, and what it leaves of the target.
+#[derive(Clone)]
+struct Addition {
+    orthonormal: Vec<Vec<f64>>,
+    rest: Vec<f64>,
+}
+
+impl Addition {
+    /// With more columns, which are orthogonal to the basis.
+    fn and(&self, columns: &[Vec<f64>]) -> Self {
+        let mut more = self.clone();
+        for column in columns {
+            if let Some(q) = unit(beside(column, &more.orthonormal)) {
+                less(&mut more.rest, &q);
+                more.orthonormal.push(q);
             }
         }
-        let length = dot(&v, &v).sqrt();
-        if length.is_nan() || length < DEPENDENT {
-            return;
-        }
-        v.iter_mut().for_each(|v| *v /= length);
-        let along = dot(&self.rest, &v);
-        self.rest
-            .iter_mut()
-            .zip(&v)
-            .for_each(|(r, v)| *r -= along * v);
-        self.orthonormal.push(v);
-        self.columns.push(column);
+        more
     }
 
-    fn with(&self, columns: &[usize]) -> Self {
-        let mut more = self.clone();
-        columns.iter().for_each(|&c| more.add(c));
-        more
+    fn error(&self) -> f64 {
+        dot(&self.rest, &self.rest).sqrt()
+    }
+}
+
+impl Basis<'_> {
+    fn add(&mut self, column: usize) {
+        let left = beside(&self.regressors.columns[column], &self.orthonormal);
+        if let Some(q) = unit(left) {
+            less(&mut self.rest, &q);
+            self.orthonormal.push(q);
+            self.columns.push(column);
+        }
+    }
+
+    fn nothing(&self) -> Addition {
+        Addition {
+            orthonormal: vec![],
+            rest: self.rest.clone(),
+        }
     }
 
     fn error(&self) -> f64 {
@@ -128,26 +164,36 @@ pub(super) fn output_equation(
             _ => linear.extend(columns),
         }
     }
-    let empty = Basis {
+    let mut basis = Basis {
         regressors,
         orthonormal: vec![],
         columns: vec![],
         rest: target.clone(),
     };
     // Relative to what the transients leave of it: a constant is no success.
-    let mut basis = empty.with(&linear);
+    linear.iter().for_each(|&c| basis.add(c));
     let mut taken = 0;
     while taken < MOST_FUNCTIONS && basis.error() > EXACT && !functions.is_empty() {
-        let mut single: Vec<(f64, usize)> = (0..functions.len())
-            .map(|g| (basis.with(&functions[g]).error(), g))
+        let left: Vec<Vec<Vec<f64>>> = functions
+            .iter()
+            .map(|g| {
+                let columns = g.iter().map(|&c| &regressors.columns[c]);
+                columns.map(|c| beside(c, &basis.orthonormal)).collect()
+            })
+            .collect();
+        let nothing = basis.nothing();
+        let alone: Vec<Addition> = left.iter().map(|g| nothing.and(g)).collect();
+        let mut single: Vec<(f64, usize)> = alone
+            .iter()
+            .enumerate()
+            .map(|(g, addition)| (addition.error(), g))
             .collect();
         single.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
-        if taken + 2 <= MOST_FUNCTIONS {
+        if taken + 2 <= MOST_FUNCTIONS && single[0].0 > EXACT {
             for &(_, g) in single.iter().take(BEST) {
-                let first = basis.with(&functions[g]);
                 for h in (0..functions.len()).filter(|&h| h != g) {
-                    pairs.push((first.with(&functions[h]).error(), g, h));
+                    pairs.push((alone[g].and(&left[h]).error(), g, h));
                 }
             }
         }

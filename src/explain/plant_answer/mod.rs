@@ -3,8 +3,10 @@
 mod effects;
 mod hypotheses;
 mod question;
+mod simulate;
 
 pub use question::{PlantOptions, PlantQuestionError};
+pub use simulate::{AugmentedPlantError, Original};
 
 use super::answer::extremes;
 use super::engine::fitted::Fitted;
