@@ -5,6 +5,8 @@ use super::explanation::{Explanation, Verdict};
 /// An effect beside a simulator that is neither linear nor reproduced by equations must take this part off the mean square of the
 /// error in blocks left out: more is explained than is not.
 const MOST: f64 = 0.5;
+/// Runs whose errors differ by less than this part are equally good (the tolerance of the project's score on real recordings).
+const EQUAL: f64 = 0.02;
 
 /// The part of the mean square of the error in blocks left out that the answer takes off.
 fn removed(explanation: &Explanation) -> f64 {
@@ -44,20 +46,51 @@ pub(crate) fn doubt(explanation: &mut Explanation) {
     );
 }
 
-/// Whether an explanation by equations that reproduce the columns stands in the place of a doubtful one. Its free run must follow
-/// the recording closer in blocks left out, and where it leaves structure itself, clearly: it takes at least [`MOST`] off the mean
-/// square of the error of the other. An explanation without effects has no blocks left out; few parameters were fitted then, and
-/// the samples that they were fitted to tell the same.
-pub(crate) fn stands_in(equations: &Explanation, doubtful: &Explanation) -> bool {
-    let error = |e: &Explanation| {
-        let steps = e.fit.heldout.as_ref().unwrap_or(&e.fit.train);
-        steps.augmented.rmse
+/// Error of one explanation's run over that of another, the geometric mean over recordings and outputs; none where they show
+/// different ones. Blocks left out do not compare them: equations run freely over thirds that their fit has not seen, a linear
+/// model over short blocks inside of what was fitted. Few parameters were fitted to the whole, so that it tells enough.
+fn error_over(one: &Explanation, other: &Explanation) -> Option<f64> {
+    let squares = |e: &Explanation| -> Vec<f64> {
+        let mean = |errors: &mut dyn Iterator<Item = f64>| {
+            let known = errors.filter(|e| e.is_finite());
+            let (sum, count) = known.fold((0.0, 0), |(sum, n), e| (sum + e * e, n + 1));
+            sum / f64::from(count.max(1))
+        };
+        let traces = e.signals.iter();
+        traces
+            .map(|t| mean(&mut t.recorded.iter().zip(&t.augmented).map(|(y, s)| y - s)))
+            .collect()
     };
+    let (ours, theirs) = (squares(one), squares(other));
+    if ours.is_empty() || ours.len() != theirs.len() {
+        return None;
+    }
+    let least = f64::MIN_POSITIVE;
+    let logs = ours.iter().zip(&theirs);
+    let sum: f64 = logs.map(|(a, b)| (a.max(least) / b.max(least)).ln()).sum();
+    Some((0.5 * sum / ours.len() as f64).exp())
+}
+
+/// Whether an explanation by equations that reproduce the columns stands in the place of a doubtful one: parameters of the
+/// simulator are accounted for in it. Its run must follow the recording as closely, and where it leaves structure itself, clearly
+/// closer: it takes at least [`MOST`] off the mean square of the error of the other.
+pub(crate) fn stands_in(equations: &Explanation, doubtful: &Explanation) -> bool {
     let most = match equations.remaining.adequate {
-        true => 1.0,
+        true => 1.0 + EQUAL,
         false => (1.0 - MOST).sqrt(),
     };
-    equations.fit.output == doubtful.fit.output && error(equations) < most * error(doubtful)
+    error_over(equations, doubtful).is_some_and(|error| error <= most)
+}
+
+/// Whether two explanations name the same effects. They were found in different ways, so that each confirms the other.
+pub(crate) fn agree(one: &Explanation, other: &Explanation) -> bool {
+    let ids = |e: &Explanation| -> Vec<String> {
+        let mut ids: Vec<String> = e.effects.iter().map(|e| e.effect.clone()).collect();
+        ids.sort_unstable();
+        ids
+    };
+    let named = |e: &Explanation| e.verdict == Verdict::Named;
+    named(one) && named(other) && ids(one) == ids(other)
 }
 
 #[cfg(test)]
@@ -90,11 +123,23 @@ mod tests {
         assert_eq!(judged(1.0, 1.1, true), (Verdict::Parameters, 0));
         assert_eq!(judged(1.0, 0.5, false), (Verdict::Unexplained, 1));
 
-        let linear = with_errors(&named, 1.0, 0.8, false);
-        let equations = |with: f64, adequate: bool| with_errors(&named, 1.0, with, adequate);
-        assert!(stands_in(&equations(0.7, true), &linear));
-        assert!(!stands_in(&equations(0.9, true), &linear));
-        assert!(!stands_in(&equations(0.7, false), &linear));
-        assert!(stands_in(&equations(0.5, false), &linear));
+        let run = |error: f64, adequate: bool| {
+            let mut e = with_errors(&named, 1.0, 0.8, adequate);
+            for t in &mut e.signals {
+                let errors = t.augmented.iter_mut().zip(&t.recorded);
+                errors.for_each(|(s, y)| *s = y + error * (*s - y));
+            }
+            e
+        };
+        let linear = run(1.0, false);
+        assert!(stands_in(&run(0.9, true), &linear));
+        assert!(!stands_in(&run(1.1, true), &linear));
+        assert!(!stands_in(&run(0.9, false), &linear));
+        assert!(stands_in(&run(0.5, false), &linear));
+
+        assert!(agree(&run(1.1, true), &linear));
+        let mut other = run(1.1, true);
+        other.effects[0].effect = "coulomb_friction".to_owned();
+        assert!(!agree(&other, &linear));
     }
 }

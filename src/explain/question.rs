@@ -5,7 +5,7 @@ use super::answer::Answer;
 use super::check::Checked;
 use super::columns;
 use super::data::Data;
-use super::doubt::{doubt, is_doubtful, stands_in};
+use super::doubt::{agree, doubt, is_doubtful, stands_in};
 use super::effects::{self, Definition};
 use super::error::ExplainError;
 use super::explanation::{Explanation, Verdict};
@@ -99,7 +99,7 @@ pub fn explain(
     .say();
     // What no linear model reproduces is first explained relative to the simulated columns, which are exact. Only where that
     // answer is doubtful are equations looked for that reproduce the columns, whose parameters can then be fitted too; data
-    // that were repaired are left to the search that knows how. The better answer is given, by its free run.
+    // that were repaired are left to the search that knows how. The answer whose run follows the recording closer is given.
     if !relative || !is_doubtful(&explanation) {
         return Ok(explanation);
     }
@@ -110,6 +110,7 @@ pub fn explain(
         .flatten();
     Ok(match equations {
         Some(equations) if stands_in(&equations, &explanation) => equations,
+        Some(equations) if agree(&equations, &explanation) => explanation,
         _ => {
             doubt(&mut explanation);
             explanation
