@@ -9,7 +9,7 @@ use super::argument::{Argument, ArgumentForm, arguments};
 use super::curve::{Curve, curves};
 use super::edit::{Place, enters_several, is_of, sensors};
 use super::library::{Needs, Port, Starts, TERMS, Term};
-use super::names::{heats_itself, rank_of};
+use super::names::{heats_itself, is_without_units, rank_of};
 use super::path::{hooked, path};
 use super::projection::{Projection, SIGNATURE};
 use super::values::{Instance, evaluate, grid};
@@ -246,8 +246,10 @@ pub(crate) fn screen(
                                 (Place::Input(v), Port::Input) => {
                                     argument.is_some_and(|a| a.variables == [v])
                                 }
+                                // Equations that were found from columns have no variable for a force between bodies.
                                 (Place::Input(v), Port::Equation) => {
                                     instance.term.needs != Needs::OwnState
+                                        && is_without_units(spec)
                                         && enters_several(spec, v)
                                         && argument
                                             .is_some_and(|a| !a.held && a.known_after.is_none())
