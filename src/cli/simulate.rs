@@ -95,6 +95,7 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
                 parameters: flags.parameters.as_deref(),
                 start: flags.start(),
                 hold: flags.hold.map(Into::into),
+                simulation: flags.simulation.as_deref(),
                 output: output.path(),
             },
             say,

@@ -155,6 +155,9 @@ pub struct AugmentedPlant {
     pub hold: String,
     /// Its outputs as the recordings call them.
     pub outputs: Vec<Channel>,
+    /// Equations that reproduce the simulated outputs, where only these were given: its parameters are those of the simulation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulation: Option<String>,
     /// Parameters that say when something has changed. Another recording comes after that.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub times_of_change: Vec<String>,

@@ -34,9 +34,11 @@ mod baseline;
 mod cascade;
 mod changes;
 mod check;
+mod columns;
 mod coordinates;
 mod curve;
 mod data;
+mod doubt;
 pub mod effects;
 mod engine;
 mod error;
@@ -87,6 +89,8 @@ pub use explanation::{
     NoiseFound, ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces,
     StatePrior, Verdict,
 };
-pub use plant_answer::{PlantOptions, PlantQuestionError, explain_plant};
+pub use plant_answer::{
+    AugmentedPlantError, Original, PlantOptions, PlantQuestionError, explain_plant,
+};
 pub use question::{Options, explain};
 pub use simulation::Simulation;

@@ -3,7 +3,9 @@
 use super::adequacy::LEVEL;
 use super::answer::Answer;
 use super::check::Checked;
+use super::columns;
 use super::data::Data;
+use super::doubt::{agree, doubt, is_doubtful, stands_in};
 use super::effects::{self, Definition};
 use super::error::ExplainError;
 use super::explanation::{Explanation, Verdict};
@@ -54,6 +56,7 @@ pub fn explain(
     let checked = Checked::new(recordings, simulation, &allowed_id);
     let recordings = checked.recordings.as_slice();
     let known = know(&checked)?;
+    let relative = known.relative;
     let drive = weak::attempt(recordings, &known, &allowed);
     // What a law in the averaged equation of a drive explains to noise needs no other way, and the rest little. Where no law
     // was found, the equation may be blind to what there is (effects of the sensor, another mode), and where a spring
@@ -86,14 +89,33 @@ pub fn explain(
         }
     };
     finding.add(checked.troubles.clone());
-    Ok(Answer {
+    let mut explanation = Answer {
         recordings,
         known: &known,
         finding: &finding,
         mask,
         seed: options.seed,
     }
-    .say())
+    .say();
+    // What no linear model reproduces is first explained relative to the simulated columns, which are exact. Only where that
+    // answer is doubtful are equations looked for that reproduce the columns, whose parameters can then be fitted too; data
+    // that were repaired are left to the search that knows how. The answer whose run follows the recording closer is given.
+    if !relative || !is_doubtful(&explanation) {
+        return Ok(explanation);
+    }
+    let equations = checked
+        .troubles
+        .is_empty()
+        .then(|| columns::attempt(&checked, &options.without))
+        .flatten();
+    Ok(match equations {
+        Some(equations) if stands_in(&equations, &explanation) => equations,
+        Some(equations) if agree(&equations, &explanation) => explanation,
+        _ => {
+            doubt(&mut explanation);
+            explanation
+        }
+    })
 }
 
 /// Whether the finding is an averaged equation of what is no drive, but a mass on a spring.

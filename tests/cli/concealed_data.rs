@@ -214,15 +214,16 @@ fn round_trip(case: &str, data: &Path, scratch: &Folder, explanation: &Explanati
     let input = read(&data.join("fresh_input.csv"), RoleNeed::InputsOnly);
     let inputs: Vec<&[f64]> = input.input_data.iter().map(Vec::as_slice).collect();
     let simulated = exists.then(|| read(&answer, RoleNeed::OutputsOnly));
-    let simulated: Option<Vec<&[f64]>> = simulated
-        .as_ref()
-        .map(|log| log.output_data.iter().map(Vec::as_slice).collect());
-    let outputs = explanation
-        .model
-        .as_ref()
-        .unwrap()
-        .simulate(&inputs, None, simulated.as_deref())
-        .unwrap();
+    let simulated = simulated.as_ref().map(|log| log.output_data.as_slice());
+    let outputs = match (&explanation.model, &explanation.plant) {
+        (Some(model), _) => {
+            let simulated: Option<Vec<&[f64]>> =
+                simulated.map(|columns| columns.iter().map(Vec::as_slice).collect());
+            model.simulate(&inputs, None, simulated.as_deref()).unwrap()
+        }
+        (None, Some(plant)) => plant.simulate(&input, simulated).unwrap(),
+        (None, None) => panic!("{case}: nothing to simulate"),
+    };
     assert_eq!(header.len(), outputs.len() + 1, "{case}");
     for (ours, theirs) in outputs.iter().zip(&printed[1..]) {
         assert_eq!(ours, theirs, "{case}");

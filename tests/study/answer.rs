@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use innovant::explain::{Explanation, Options, Verdict, explain};
 
-use super::question::Question;
+use super::question::{Question, log};
 use crate::concealed::{Case, Truth};
 
 /// Effects that count as one kind.
@@ -228,16 +228,24 @@ fn overlap(a: [f64; 2], b: [f64; 2]) -> f64 {
 /// Share of the simulation's error on the first output that the augmented model removes on the fresh input.
 fn removed(case: &Case, explanation: &Explanation) -> Result<f64, String> {
     let inputs: Vec<&[f64]> = case.fresh_input.iter().map(Vec::as_slice).collect();
-    let simulated: Option<Vec<&[f64]>> = case
-        .fresh_simulation
-        .as_ref()
-        .map(|s| s.iter().map(Vec::as_slice).collect());
-    let predicted = explanation
-        .model
-        .as_ref()
-        .unwrap()
-        .simulate(&inputs, None, simulated.as_deref())
-        .map_err(|error| error.to_string())?;
+    let predicted = match (&explanation.model, &explanation.plant) {
+        (Some(model), _) => {
+            let simulated: Option<Vec<&[f64]>> = case
+                .fresh_simulation
+                .as_ref()
+                .map(|s| s.iter().map(Vec::as_slice).collect());
+            model
+                .simulate(&inputs, None, simulated.as_deref())
+                .map_err(|error| error.to_string())?
+        }
+        (None, Some(plant)) => {
+            let fresh = log("fresh", case.truth.dt, &case.fresh_input, &case.fresh_truth);
+            plant
+                .simulate(&fresh, case.fresh_simulation.as_deref())
+                .map_err(|error| error.to_string())?
+        }
+        (None, None) => return Err("nothing to simulate".to_owned()),
+    };
     let (y, truth) = (&predicted[0], &case.fresh_truth[0]);
     let start = y.len() / 20;
     let square: f64 = y[start..]

@@ -123,7 +123,7 @@ fn scale(log: &mut Log, u: f64, y: f64) {
         .for_each(|value| *value *= y);
 }
 
-fn log(name: &str, sample_time: f64, inputs: &[Vec<f64>], outputs: &[Vec<f64>]) -> Log {
+pub fn log(name: &str, sample_time: f64, inputs: &[Vec<f64>], outputs: &[Vec<f64>]) -> Log {
     Log {
         name: name.to_owned(),
         sample_time,

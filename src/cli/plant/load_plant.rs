@@ -65,14 +65,9 @@ pub(crate) fn load(path: &Path) -> anyhow::Result<LoadedPlant> {
     if let Some(explanation) = explained(path, &text)
         && let Some(found) = &explanation.plant
     {
-        let hold = if found.hold == "linear" {
-            Hold::Linear
-        } else {
-            Hold::Zero
-        };
         let loaded = of_text(&name, &found.modelica)?;
         return Ok(LoadedPlant {
-            hold,
+            hold: found.hold(),
             explanation: Some(explanation),
             ..loaded
         });

@@ -3,13 +3,14 @@
 use std::path::Path;
 
 use super::load_plant::{
-    LoadedPlant, all_known, assignments, load, read_recordings, set_parameters, set_start,
-    tell_warnings,
+    LoadedPlant, all_known, assignments, load, read_recordings, read_with, set_parameters,
+    set_start, tell_warnings,
 };
 use crate::cli::flags::RoleFlags;
 use crate::cli::terminal::note;
 use crate::cli::{Outcome, Verbosity};
-use crate::log::{Channel, RoleNeed, Source, write_table};
+use crate::explain::AugmentedPlant;
+use crate::log::{Channel, RoleNeed, Roles, Source, write_table};
 use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
 use crate::physics::{Excitation, Hold, Point};
 use crate::report::{PlantDocument, is_plant};
@@ -35,6 +36,8 @@ pub(crate) struct PlantRun<'a> {
     pub parameters: Option<&'a str>,
     pub start: Start,
     pub hold: Option<Hold>,
+    /// Answer of the original simulator to this input.
+    pub simulation: Option<&'a Path>,
     pub output: &'a Path,
 }
 
@@ -113,6 +116,32 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
             point.start = found.points[0].start.clone();
         }
     }
+    let beside = match asked.simulation {
+        Some(file) => {
+            let found = explanation.as_ref().and_then(|e| e.plant.as_ref());
+            let original = found
+                .map(|found| {
+                    let simulated = simulated(found, file, asked.roles, say)?;
+                    found
+                        .original(&log, &simulated, hold)
+                        .map_err(|e| anyhow::anyhow!("{}: {e}", file.display()))
+                })
+                .transpose()?
+                .flatten();
+            if original.is_none() {
+                anyhow::bail!(
+                    "{}: --simulation belongs to an explanation of simulated columns, and this plant was given as equations; leave \
+                     it out",
+                    asked.plant.display()
+                );
+            }
+            original
+        }
+        None => None,
+    };
+    if let (Some(original), Start::Text) = (&beside, &asked.start) {
+        set_start(&plant, &mut point, &original.start)?;
+    }
     let inputs: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
     let excitation = Excitation {
         inputs: &inputs,
@@ -121,9 +150,14 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         start_time: log.start_time,
         hold,
     };
-    let run = plant
+    let mut run = plant
         .simulate(&point, &excitation, None)
         .map_err(|e| anyhow::anyhow!("{}: {e}", asked.plant.display()))?;
+    if let Some(original) = &beside {
+        for (y, rest) in run.outputs.iter_mut().zip(&original.remainder) {
+            y.iter_mut().zip(rest).for_each(|(y, rest)| *y += rest);
+        }
+    }
     let declared = plant.spec.outputs().into_iter().map(|v| Channel {
         name: plant.spec.variable(v).column().to_owned(),
         unit: plant.spec.variable(v).unit_text.clone(),
@@ -136,6 +170,30 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         .collect();
     write_table(asked.output, log.sample_time, log.start_time, &columns)?;
     Ok(Outcome::Done)
+}
+
+/// The simulator's answer to one input.
+fn simulated(
+    found: &AugmentedPlant,
+    file: &Path,
+    roles: &RoleFlags,
+    say: Verbosity,
+) -> anyhow::Result<Vec<Vec<f64>>> {
+    let outputs: Vec<String> = found.outputs.iter().map(|c| c.name.clone()).collect();
+    let roles = Roles {
+        inputs: None,
+        outputs: Some(outputs),
+        ..roles.clone().roles()
+    };
+    let source = Source::from(file.to_owned());
+    let (mut logs, _) = read_with(&roles, &[source], RoleNeed::OutputsOnly, say)?;
+    if logs.len() != 1 {
+        anyhow::bail!(
+            "{}: samples are missing in the middle; give the simulator's answer without gaps",
+            file.display()
+        );
+    }
+    Ok(logs.remove(0).output_data)
 }
 
 /// Says on standard error which values are outside the bounds of the text: a simulation may use them.

@@ -3,7 +3,7 @@
 use crate::physics::{ModelSpec, VariableId, VariableKind};
 
 use super::library::Needs;
-use super::names::is_velocity;
+use super::names::{is_velocity, may_be_angle, may_be_velocity};
 
 /// How an argument is made of variables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,8 +55,13 @@ impl Argument {
             .all(|&v| spec.variable(v).kind == VariableKind::Input);
         Self {
             form: ArgumentForm::Variable,
-            velocity: is_velocity(spec, &variables),
-            angle: variables.len() == 1 && unit(variables[0]) == "rad",
+            velocity: is_velocity(spec, &variables)
+                || may_be_velocity(spec, &variables)
+                    && variables
+                        .iter()
+                        .all(|&v| spec.variable(v).kind != VariableKind::Input),
+            angle: variables.len() == 1
+                && (unit(variables[0]) == "rad" || may_be_angle(spec, &variables)),
             held,
             expression,
             variables,

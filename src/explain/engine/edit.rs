@@ -336,6 +336,11 @@ pub(crate) fn user_of(spec: &ModelSpec, parameter: VariableId) -> VariableId {
     spans.into_iter().find_map(inside).unwrap_or(parameter)
 }
 
+/// Whether an input enters at several places at once: what is between them, such as a force between two bodies, acts there too.
+pub(crate) fn enters_several(spec: &ModelSpec, input: VariableId) -> bool {
+    uses(spec, input).len() > 1
+}
+
 /// The output equations that copy a variable: `y = T`.
 pub(crate) fn sensors(spec: &ModelSpec) -> Vec<usize> {
     (0..spec.equations.len())

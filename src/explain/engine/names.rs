@@ -1,8 +1,8 @@
 //! What a term is called at the place where it was found.
 
-use crate::physics::{ModelSpec, Node, Unknown, VariableId, VariableKind};
+use crate::physics::{Binary, Equation, ModelSpec, Node, Unknown, VariableId, VariableKind};
 
-use super::edit::Place;
+use super::edit::{Place, user_of};
 use super::fitted::Fitted;
 use super::library::{Needs, Port, Term};
 
@@ -13,6 +13,8 @@ enum Kind {
     Velocity,
     Temperature,
     Other,
+    /// Nothing in the plant has a unit: it is what the effect needs.
+    Unknown,
 }
 
 /// The state whose derivative is defined as this variable: `der(x) = v`.
@@ -47,9 +49,31 @@ fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
         Kind::Position
     } else if all(&|v| matches!(unit(v), "K" | "degC")) {
         Kind::Temperature
+    } else if !variables.is_empty() && is_without_units(spec) {
+        Kind::Unknown
     } else {
         Kind::Other
     }
+}
+
+/// Whether no variable of a plant has a unit.
+pub(super) fn is_without_units(spec: &ModelSpec) -> bool {
+    spec.variables.iter().all(|v| v.unit_text.is_none())
+}
+
+/// Whether a term slows the motion that it is a function of: without units, its own state is a velocity then.
+fn slows(term: &Term) -> bool {
+    matches!(term.id, "signed_square" | "cube" | "friction" | "one_sided")
+}
+
+/// Whether these may be velocities.
+pub(super) fn may_be_velocity(spec: &ModelSpec, variables: &[VariableId]) -> bool {
+    matches!(kind(spec, variables), Kind::Velocity | Kind::Unknown)
+}
+
+/// Whether these may be angles.
+pub(super) fn may_be_angle(spec: &ModelSpec, variables: &[VariableId]) -> bool {
+    is_without_units(spec) && kind(spec, variables) == Kind::Position
 }
 
 /// Whether all of these are velocities.
@@ -79,7 +103,7 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
     let fastest = found.range.0.abs().max(found.range.1.abs());
     match (id, found.shapes.first()) {
         ("hysteresis", Some(&slip))
-            if kind(spec, &variables) == Kind::Velocity && slip < YIELDS * found.travel =>
+            if may_be_velocity(spec, &variables) && slip < YIELDS * found.travel =>
         {
             "coulomb_friction"
         }
@@ -124,8 +148,11 @@ pub(crate) fn called(
     if term.id == "hypothesis" {
         return term.id;
     }
-    let what = kind(spec, variables);
     let own = place.variable(spec);
+    let what = match kind(spec, variables) {
+        Kind::Unknown if slows(term) && *variables == [own] => Kind::Velocity,
+        known => known,
+    };
     let unit = |v: VariableId| spec.variable(v).unit_text.as_deref().unwrap_or("");
     let unit_of_place = unit(own);
     match (term.port, term.id) {
@@ -133,7 +160,9 @@ pub(crate) fn called(
         (Port::Input, "input_square" | "input_cube") => "input_curve",
         (Port::Input, id) => id,
         (Port::Parameter, "parameter_step" | "parameter_ramp") => "parameter_change",
-        (Port::Parameter, "parameter_heating") if unit_of_place == "Ohm" => {
+        (Port::Parameter, "parameter_heating")
+            if unit_of_place == "Ohm" || heats_itself(spec, own, variables) =>
+        {
             "temperature_dependent_resistance"
         }
         (Port::Parameter, "parameter_curve" | "parameter_square") => match what {
@@ -157,7 +186,7 @@ pub(crate) fn called(
         (Port::Equation, "one_sided") if what == Kind::Velocity => "asymmetric_damping",
         (Port::Equation, "above" | "below" | "both_sides") => match what {
             Kind::Position => "end_stop",
-            Kind::Other if *variables == [own] => "overflow",
+            Kind::Other | Kind::Unknown if *variables == [own] => "overflow",
             _ => "law",
         },
         (Port::Equation, "root_above") if *variables == [own] => "overflow",
@@ -165,7 +194,11 @@ pub(crate) fn called(
         (Port::Equation, "sine") => "cogging",
         (Port::Equation, "periodic") => "periodic_disturbance",
         (Port::Equation, "radiation") => "radiation",
-        (Port::Equation, "natural_convection") if what == Kind::Temperature => "natural_convection",
+        (Port::Equation, "natural_convection")
+            if matches!(what, Kind::Temperature | Kind::Unknown) =>
+        {
+            "natural_convection"
+        }
         (Port::Equation, "load_constant" | "load_ramp" | "load_step") => {
             let output =
                 spec.variable(own).output && spec.variable(own).kind == VariableKind::Algebraic;
@@ -203,6 +236,24 @@ pub(crate) fn called(
         }
         _ => "law",
     }
+}
+
+/// Whether a parameter without a unit may be a resistance that its own current heats: it damps the state of its equation, and
+/// the heat is that of this state.
+pub(super) fn heats_itself(spec: &ModelSpec, parameter: VariableId, heat: &[VariableId]) -> bool {
+    let [state] = *heat else { return false };
+    let damping = |node: &Node| match *node {
+        Node::Binary(Binary::Multiply, a, b) => {
+            [a, b].map(|id| spec.expressions.node(id))
+                == [Node::Variable(parameter), Node::Variable(state)]
+        }
+        _ => false,
+    };
+    let derived = |e: &Equation| e.unknown == Unknown::Derivative(state);
+    is_without_units(spec)
+        && user_of(spec, parameter) == state
+        && spec.equations.iter().any(derived)
+        && spec.expressions.any(damping)
 }
 
 /// How specific a term is: of two that explain a recording equally well the one with a name of its own is meant, and where the
@@ -250,4 +301,49 @@ pub(super) fn rank_of(spec: &ModelSpec, term: &Term, place: Place, variables: &[
         _ => of_place,
     };
     PLACES * of_name + elsewhere
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::library::TERMS;
+    use super::*;
+    use crate::physics::parse;
+
+    fn name(text: &str, term: &str, at: &str, of: &str) -> &'static str {
+        let spec = parse(text).unwrap();
+        let term = TERMS.iter().find(|t| t.id == term).unwrap();
+        let unknown = |e: &Equation| e.unknown.variable() == spec.find(at).unwrap();
+        let place = spec.equations.iter().position(unknown).unwrap();
+        called(
+            &spec,
+            term,
+            Place::Equation(place),
+            &[spec.find(of).unwrap()],
+        )
+    }
+
+    #[test]
+    fn without_units_what_slows_itself_is_a_velocity() {
+        let bare = "model M input Real u; output Real y; Real w; Real i;
+                    equation der(w) = i - w; der(i) = u - i; y = w; end M;";
+        assert_eq!(name(bare, "signed_square", "w", "w"), "quadratic_drag");
+        assert_eq!(name(bare, "friction", "w", "w"), "coulomb_friction");
+        // Not what another state does, and not what has a unit that is none of a velocity.
+        assert_eq!(name(bare, "signed_square", "w", "i"), "law");
+        let warm = bare.replace("Real w;", "Real w(unit=\"K\");");
+        assert_eq!(name(&warm, "signed_square", "w", "w"), "law");
+    }
+
+    #[test]
+    fn without_units_a_coefficient_that_damps_its_state_may_be_heated() {
+        let spec = parse(
+            "model M parameter Real r = 2; parameter Real b = 1; input Real u; output Real y; Real i;
+             equation der(i) = b*u - r*i; y = i; end M;",
+        )
+        .unwrap();
+        let v = |name: &str| spec.find(name).unwrap();
+        assert!(heats_itself(&spec, v("r"), &[v("i")]));
+        assert!(!heats_itself(&spec, v("b"), &[v("i")]));
+        assert!(!heats_itself(&spec, v("r"), &[v("u")]));
+    }
 }

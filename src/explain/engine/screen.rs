@@ -7,9 +7,9 @@ use rayon::prelude::*;
 
 use super::argument::{Argument, ArgumentForm, arguments};
 use super::curve::{Curve, curves};
-use super::edit::{Place, is_of, sensors};
+use super::edit::{Place, enters_several, is_of, sensors};
 use super::library::{Needs, Port, Starts, TERMS, Term};
-use super::names::rank_of;
+use super::names::{heats_itself, is_without_units, rank_of};
 use super::path::{hooked, path};
 use super::projection::{Projection, SIGNATURE};
 use super::values::{Instance, evaluate, grid};
@@ -246,10 +246,24 @@ pub(crate) fn screen(
                                 (Place::Input(v), Port::Input) => {
                                     argument.is_some_and(|a| a.variables == [v])
                                 }
+                                // Equations that were found from columns have no variable for a force between bodies.
+                                (Place::Input(v), Port::Equation) => {
+                                    instance.term.needs != Needs::OwnState
+                                        && is_without_units(spec)
+                                        && enters_several(spec, v)
+                                        && argument
+                                            .is_some_and(|a| !a.held && a.known_after.is_none())
+                                }
                                 (Place::Parameter(p), Port::Parameter) => {
                                     let unit = spec.variable(p).unit_text.as_deref();
                                     let units = instance.term.units;
-                                    (units.is_empty() || unit.is_some_and(|u| units.contains(&u)))
+                                    let heats = || {
+                                        argument
+                                            .is_some_and(|a| heats_itself(spec, p, &a.variables))
+                                    };
+                                    (units.is_empty()
+                                        || unit.is_some_and(|u| units.contains(&u))
+                                        || heats())
                                         && argument.is_none_or(|a| a.known_after.is_none())
                                 }
                                 _ => false,

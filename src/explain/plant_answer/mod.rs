@@ -3,8 +3,10 @@
 mod effects;
 mod hypotheses;
 mod question;
+mod simulate;
 
 pub use question::{PlantOptions, PlantQuestionError};
+pub use simulate::{AugmentedPlantError, Original};
 
 use super::answer::extremes;
 use super::engine::fitted::Fitted;
@@ -294,6 +296,7 @@ impl Answer<'_> {
                     .plant
                     .text_at(&self.whole.points(&self.found.fit)[0]),
                 outputs: self.channels.clone(),
+                simulation: None,
                 times_of_change: self.times_of_change(),
                 hold: if self.hold == Hold::Zero {
                     "zero"
