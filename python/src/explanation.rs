@@ -2,7 +2,11 @@
 
 use std::path::PathBuf;
 
-use innovant::explain::{AugmentedModel, Options, Simulation, explain as explain_logs};
+use innovant::explain::{
+    AugmentedModel, Hypothesis, Options, PlantOptions, Simulation, explain as explain_logs,
+    explain_plant as explain_equations,
+};
+use innovant::identify::Recording;
 use innovant::log::write_file_atomically;
 use innovant::report::text::explanation_text;
 use innovant::report::{explanation_page, parse_explanation, to_json};
@@ -12,6 +16,7 @@ use pyo3::prelude::*;
 use crate::arrays::{Samples, columns, recording, recording_name, recordings, samples, slices};
 use crate::errors::raise;
 use crate::model::Model;
+use crate::plant::Plant;
 
 /// The answer, ready to be simulated.
 #[pyclass(module = "innovant._innovant", frozen)]
@@ -126,6 +131,39 @@ pub fn explain(
     };
     let options = Options { without, seed };
     let explanation = py.detach(|| explain_logs(&logs, &simulation, &options));
+    let explanation = explanation.map_err(raise)?;
+    Ok(Explanation { explanation })
+}
+
+/// Compares recordings with a plant in equations.
+#[pyfunction]
+#[allow(clippy::too_many_arguments, reason = "called by one Python function")]
+pub fn explain_plant(
+    py: Python<'_>,
+    plant: &Plant,
+    u: Vec<Samples<'_>>,
+    y: Vec<Samples<'_>>,
+    dt: f64,
+    names: (Vec<String>, Vec<String>),
+    hold: Option<&str>,
+    only: Vec<String>,
+    without: Vec<String>,
+    hypotheses: Vec<String>,
+) -> PyResult<Explanation> {
+    let logs = recordings(&u, &y, dt, &names.0, &names.1)?;
+    let known = logs.iter().map(|log| Recording::of_log(log, None));
+    let known: Vec<Recording> = known.collect();
+    let at_values = plant.core.with_values(&plant.point.parameters);
+    let parsed = hypotheses.iter().map(|text| {
+        Hypothesis::parse(text, &at_values.spec).map_err(|e| raise(e.render("hypotheses")))
+    });
+    let options = PlantOptions {
+        hold: plant.hold(hold)?,
+        only,
+        without,
+        hypotheses: parsed.collect::<PyResult<_>>()?,
+    };
+    let explanation = py.detach(|| explain_equations(&at_values, &logs, known, &options));
     let explanation = explanation.map_err(raise)?;
     Ok(Explanation { explanation })
 }

@@ -45,6 +45,7 @@ fn _innovant(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<plant::Plant>()?;
     module.add_function(wrap_pyfunction!(model::identify, module)?)?;
     module.add_function(wrap_pyfunction!(explanation::explain, module)?)?;
+    module.add_function(wrap_pyfunction!(explanation::explain_plant, module)?)?;
     module.add_function(wrap_pyfunction!(responses::poles, module)?)?;
     module.add_function(wrap_pyfunction!(responses::zeros, module)?)?;
     module.add_function(wrap_pyfunction!(responses::default_frequencies, module)?)?;

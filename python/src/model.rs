@@ -16,7 +16,7 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, ToPyArray};
 use pyo3::prelude::*;
 
 use crate::arrays::{Samples, columns, matrix, recordings, samples, slices};
-use crate::errors::raise;
+use crate::errors::{check_level, raise};
 use crate::options::options;
 use crate::records::ArrayRecords;
 
@@ -203,11 +203,7 @@ impl Model {
         detrend: Option<&str>,
         fresh: bool,
     ) -> PyResult<(String, String)> {
-        if !(level > 0.0 && level < 0.5) {
-            return Err(raise(format!(
-                "level = {level}: expected a probability between 0 and 0.5, such as 0.01"
-            )));
-        }
+        check_level(level)?;
         let (inputs, outputs) = self.names();
         let logs = recordings(&u, &y, self.dt(), &inputs, &outputs)?;
         let (relation, zero) = match (detrend, fresh) {

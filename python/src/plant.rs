@@ -1,31 +1,34 @@
 //! Plants in equations.
 
-use innovant::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate, evaluate};
+use innovant::log::Channel;
+use innovant::physics::estimate::{
+    EstimateOptions, Form, Held, PlantRecording, estimate, evaluate,
+};
 use innovant::physics::{
     Excitation, Hold, OperatingPoint, Plant as Core, Point, VariableId, diagnose, render_all,
 };
-use innovant::report::text::{Style, plant_estimate_text, plant_text};
+use innovant::report::text::{Style, plant_estimate_text, plant_text, plant_validation_text};
 use innovant::report::{
-    LinearisationDocument, PlantDocument, Uncertain, frequency_grid, plant_fits, plant_page,
-    to_json,
+    LinearisationDocument, PlantDocument, Uncertain, frequency_grid, judge_plant, plant_fits,
+    plant_page, text_alone, to_json,
 };
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
 use crate::arrays::{Samples, columns, matrix, recordings, samples, slices};
-use crate::errors::raise;
+use crate::errors::{check_level, raise};
 
 /// A plant in equations.
 #[pyclass(frozen)]
 pub struct Plant {
-    core: Core,
-    point: Point,
+    pub core: Core,
+    pub point: Point,
     /// What was estimated.
     document: Option<PlantDocument>,
 }
 
-/// Logs as recordings of a plant.
-fn hold(name: &str) -> PyResult<Hold> {
+/// How inputs behave between samples, by name.
+pub fn hold(name: &str) -> PyResult<Hold> {
     match name {
         "zero" => Ok(Hold::Zero),
         "linear" => Ok(Hold::Linear),
@@ -38,6 +41,17 @@ impl Plant {
         of.into_iter()
             .map(|v| self.core.spec.variable(v).column().to_owned())
             .collect()
+    }
+
+    /// How inputs behave between samples: as asked, as in the estimation, or held.
+    pub fn hold(&self, asked: Option<&str>) -> PyResult<Hold> {
+        match asked {
+            Some(name) => hold(name),
+            None => Ok(self
+                .document
+                .as_ref()
+                .map_or(Hold::Zero, PlantDocument::hold)),
+        }
     }
 
     fn check_inputs(&self, inputs: &[f64]) -> PyResult<()> {
@@ -100,12 +114,41 @@ impl Plant {
         plant_text(&self.core)
     }
 
+    fn name(&self) -> String {
+        self.core.spec.name.clone()
+    }
+
+    /// How inputs behave between samples, by name.
+    fn hold_name(&self) -> PyResult<&'static str> {
+        Ok(match self.hold(None)? {
+            Hold::Linear => "linear",
+            Hold::Zero => "zero",
+        })
+    }
+
     fn inputs(&self) -> Vec<String> {
         self.names(self.core.spec.inputs())
     }
 
     fn outputs(&self) -> Vec<String> {
         self.names(self.core.spec.outputs())
+    }
+
+    /// Headers of the inputs, of the outputs: names with units.
+    fn headers(&self) -> (Vec<String>, Vec<String>) {
+        let of = |variables: Vec<VariableId>| {
+            let declared = variables.into_iter().map(|v| self.core.spec.variable(v));
+            declared
+                .map(|v| {
+                    Channel {
+                        name: v.column().to_owned(),
+                        unit: v.unit_text.clone(),
+                    }
+                    .to_string()
+                })
+                .collect()
+        };
+        (of(self.core.spec.inputs()), of(self.core.spec.outputs()))
     }
 
     fn states(&self) -> Vec<String> {
@@ -196,6 +239,81 @@ impl Plant {
             let text = plant_estimate_text(&document, &title, Style::UNICODE);
             Ok((document.to_json().map_err(raise)?, text))
         })
+    }
+
+    /// Initial states of a recording that fit its outputs best in free run.
+    fn initial_state(
+        &self,
+        py: Python<'_>,
+        u: Samples<'_>,
+        y: Samples<'_>,
+        dt: f64,
+        hold: Option<&str>,
+    ) -> PyResult<Vec<(String, f64)>> {
+        let options = EstimateOptions {
+            free: vec![false; self.point.parameters.len()],
+            hold: self.hold(hold)?,
+            form: Some(Form::FreeRun),
+            least_squares: true,
+        };
+        let logs = recordings(&[u], &[y], dt, &self.inputs(), &self.outputs())?;
+        let plant = self.core.with_values(&self.point.parameters);
+        let start = py.detach(|| {
+            let records: Vec<PlantRecording> = logs.iter().map(PlantRecording::from).collect();
+            let found = estimate(&plant, &records, &options).map_err(raise)?;
+            Ok::<_, PyErr>(plant.start(&found.points[0]))
+        })?;
+        Ok(self.states().into_iter().zip(start).collect())
+    }
+
+    /// Judges the plant on recordings that it was (`own`) or was not estimated from: the document as JSON and as text, the
+    /// free run of each recording and its predictions one sample ahead.
+    #[allow(clippy::too_many_arguments, clippy::type_complexity)]
+    fn validate<'py>(
+        &self,
+        py: Python<'py>,
+        u: Vec<Samples<'_>>,
+        y: Vec<Samples<'_>>,
+        dt: f64,
+        hold: Option<&str>,
+        level: f64,
+        own: bool,
+    ) -> PyResult<(
+        String,
+        String,
+        Option<Vec<Bound<'py, PyArray2<f64>>>>,
+        Vec<Bound<'py, PyArray2<f64>>>,
+    )> {
+        check_level(level)?;
+        let logs = recordings(&u, &y, dt, &self.inputs(), &self.outputs())?;
+        let held = match &self.document {
+            None => text_alone(&self.point, self.hold(hold)?),
+            Some(document) => {
+                let held = match own {
+                    true => document.held_with_starts(&self.core, &self.point),
+                    false => document.held(&self.core, &self.point, false),
+                };
+                Held {
+                    hold: self.hold(hold)?,
+                    ..held
+                }
+            }
+        };
+        let (validation, found) = py.detach(|| {
+            let records: Vec<PlantRecording> = logs.iter().map(PlantRecording::from).collect();
+            judge_plant(&self.core, &records, &held, level).map_err(raise)
+        })?;
+        let outputs = self.outputs().len();
+        let arrays = |series: &[Vec<f64>]| {
+            let each = series.chunks(outputs.max(1));
+            each.map(|columns| samples(py, columns)).collect::<Vec<_>>()
+        };
+        Ok((
+            to_json(&validation).map_err(raise)?,
+            plant_validation_text(&validation, Style::UNICODE),
+            found.simulated.as_deref().map(arrays),
+            arrays(&found.predicted),
+        ))
     }
 
     /// Continuous-time `A, B, C, D` at a state and inputs.

@@ -22,5 +22,5 @@ def test_there_are_examples():
     finder = doctest.DocTestFinder()
     modules = [innovant, *(importlib.import_module(f"innovant.{name}") for name in MODULES)]
     examples = {test.name for module in modules for test in finder.find(module) if test.examples}
-    for name in ("identification.identify", "explanation.explain", "model.Model.simulate", "dask.identify"):
+    for name in ("identification.identify", "explanation.explain", "model.Model.simulate", "dask.identify", "comparison.compare"):
         assert f"innovant.{name}" in examples

@@ -1,11 +1,14 @@
 """The examples run, and say what they promise."""
 
+import contextlib
+import io
 import json
 import runpy
 import subprocess
 import sys
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 
 
@@ -66,18 +69,22 @@ def test_every_example_is_tested():
     ]
 
 
-def test_the_readme_tells_the_truth():
-    """The Python of README.md prints what stands below it."""
-    text = (Path(__file__).parent.parent / "README.md").read_text()
-    code = text.split("<!-- example -->\n```python\n")[1].split("```")[0]
-    printed = text.split("<!-- output -->\n```text\n")[1].split("```")[0]
-    import contextlib
-    import io
-
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out):
-        exec(compile(code, "README.md", "exec"), {})
-    assert out.getvalue() == printed
+def test_the_readme_tells_the_truth(monkeypatch, tmp_path):
+    """The Python of README.md prints what stands below it; each example goes on where the one before ended."""
+    matplotlib.use("Agg")
+    monkeypatch.chdir(tmp_path)
+    text = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+    parts = text.split("<!-- example -->\n```python\n")[1:]
+    assert len(parts) == 2
+    names = {}
+    for part in parts:
+        code = part.split("```")[0]
+        printed = part.split("<!-- output -->\n```text\n")[1].split("```")[0]
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out):
+            exec(compile(code, "README.md", "exec"), names)
+        assert out.getvalue() == printed
+    assert (tmp_path / "comparison.png").stat().st_size > 10_000
 
 
 def test_types_are_stubbed():

@@ -133,7 +133,7 @@ def test_models_out_of_matrices():
 
 
 def test_data_that_do_not_fit_are_refused(model, closed_loop):
-    with pytest.raises(innovant.InnovantError, match="the model has 2 inputs, but the data have 1"):
+    with pytest.raises(innovant.InnovantError, match=r"u has the shape \(2000,\), 1 channel; expected samples x 2"):
         model.simulate(closed_loop.u[:, 0])
     with pytest.raises(innovant.InnovantError):
         model.predict(closed_loop.u, closed_loop.y[:10])

@@ -9,25 +9,32 @@ Order 4 model of 2 outputs from 2 inputs, 2000 samples, 1 s: nothing left to exp
 
 from . import examples
 from ._innovant import InnovantError, __version__
+from .comparison import Comparison, compare
+from .estimate import Estimate, EstimatedParameter
 from .explanation import Explanation, explain
 from .identification import identify
+from .linearisation import Linearisation
 from .model import Model
 from .moments import Moments
-from .plant import Estimate, Plant, PlantEstimate
+from .plant import Plant, PlantEstimate
 from .record import Record
 from .responses import FrequencyResponse, Roots, StepResponse
 from .simulator import Simulator, SimulatorEstimate
-from .validation import Validation
+from .validation import PlantValidation, Validation
 
 __all__ = [
+    "Comparison",
     "Estimate",
+    "EstimatedParameter",
     "Explanation",
     "FrequencyResponse",
     "InnovantError",
+    "Linearisation",
     "Model",
     "Moments",
     "Plant",
     "PlantEstimate",
+    "PlantValidation",
     "Record",
     "Roots",
     "Simulator",
@@ -35,6 +42,7 @@ __all__ = [
     "StepResponse",
     "Validation",
     "__version__",
+    "compare",
     "examples",
     "explain",
     "identify",

@@ -1,6 +1,7 @@
 """The native part: what the Python files of this package are made of. Not part of the interface."""
 
 from collections.abc import Callable, Sequence
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +11,35 @@ _Complex = NDArray[np.complex128]
 _Roots = tuple[_Complex, _Array, list[_Array]]
 _Names = tuple[list[str], list[str]]
 
+__all__ = [
+    "Explanation",
+    "InnovantError",
+    "Model",
+    "Moments",
+    "Plant",
+    "__version__",
+    "default_frequencies",
+    "estimate_simulator",
+    "example",
+    "explain",
+    "explain_plant",
+    "find_columns",
+    "frequency_response",
+    "identify",
+    "poles",
+    "settling_samples",
+    "static_gain",
+    "step_response",
+    "time_base",
+    "zeros",
+]
+
 __version__: str
 
 class InnovantError(ValueError):
     """What is wrong with recordings, options or documents, and what to do about it."""
 
+@final
 class Model:
     def a(self) -> _Array: ...
     def b(self) -> _Array: ...
@@ -43,6 +68,7 @@ class Model:
     @staticmethod
     def from_json(name: str, text: str) -> Model: ...
 
+@final
 class Explanation:
     def to_json(self) -> str: ...
     @staticmethod
@@ -54,9 +80,13 @@ class Explanation:
     def simulate(self, u: _Array, x0: list[float] | None, simulation: _Array | None) -> _Array: ...
     def initial_state(self, u: _Array, y: _Array) -> _Array: ...
 
+@final
 class Plant:
-    def __init__(self, name: str, text: str) -> None: ...
+    def __new__(cls, name: str, text: str) -> Plant: ...
     def text(self) -> str: ...
+    def name(self) -> str: ...
+    def hold_name(self) -> str: ...
+    def headers(self) -> _Names: ...
     def inputs(self) -> list[str]: ...
     def outputs(self) -> list[str]: ...
     def states(self) -> list[str]: ...
@@ -80,6 +110,10 @@ class Plant:
         form: str | None,
         least_squares: bool,
     ) -> tuple[str, str]: ...
+    def initial_state(self, u: _Array, y: _Array, dt: float, hold: str | None) -> list[tuple[str, float]]: ...
+    def validate(
+        self, u: list[_Array], y: list[_Array], dt: float, hold: str | None, level: float, own: bool
+    ) -> tuple[str, str, list[_Array] | None, list[_Array]]: ...
     def linearise(
         self, state: list[tuple[str, float]], inputs: list[float]
     ) -> tuple[_Array, _Array, _Array, _Array]: ...
@@ -89,10 +123,11 @@ class Plant:
     def modelica(self) -> str: ...
     def page(self, u: list[_Array], y: list[_Array], dt: float) -> str: ...
 
+@final
 class Moments:
-    def __init__(
-        self, u: _Array, y: _Array, dt: float, names: _Names, overlap: int, keep: int, json: str
-    ) -> None: ...
+    def __new__(
+        cls, u: _Array, y: _Array, dt: float, names: _Names, overlap: int, keep: int, json: str
+    ) -> Moments: ...
     def append(self, next: Moments) -> Moments: ...
     def add(self, other: Moments) -> Moments: ...
     def samples(self) -> int: ...
@@ -115,6 +150,17 @@ def explain(
     outputs: Sequence[_Array],
     without: Sequence[str],
     seed: int,
+) -> Explanation: ...
+def explain_plant(
+    plant: Plant,
+    u: Sequence[_Array],
+    y: Sequence[_Array],
+    dt: float,
+    names: _Names,
+    hold: str | None,
+    only: Sequence[str],
+    without: Sequence[str],
+    hypotheses: Sequence[str],
 ) -> Explanation: ...
 def poles(model: Model) -> _Roots: ...
 def zeros(model: Model) -> _Roots: ...

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from .frames import Array
 
-if TYPE_CHECKING:
-    from .model import Model
 
+def with_delays(a: Array, b: Array, c: Array, d: Array, delays: Sequence[int]) -> tuple[Array, Array, Array, Array]:
+    """A, B, C, D with the known delays of the inputs as states: a delay of d samples is a chain of d of them.
 
-def with_delays(model: Model) -> tuple[Array, Array, Array, Array]:
-    """A, B, C, D with the known delays of the inputs as states: a delay of d samples is a chain of d of them."""
-    a, b, c, d = model.A, model.B, model.C, model.D
-    for channel, delay in enumerate(model.input_delays):
+    >>> one = np.ones((1, 1))
+    >>> with_delays(0.5 * one, one, one, 0 * one, [2])[0].shape
+    (3, 3)
+    """
+    for channel, delay in enumerate(delays):
         if delay == 0:
             continue
         n = a.shape[0]
@@ -31,17 +32,3 @@ def with_delays(model: Model) -> tuple[Array, Array, Array, Array]:
         d = d.copy()
         d[:, channel] = 0.0
     return a, b, c, d
-
-
-def to_control(model: Model) -> Any:
-    """See `Model.to_control`."""
-    import control
-
-    return control.StateSpace(*with_delays(model), model.dt, inputs=model.input_labels, outputs=model.output_labels)
-
-
-def to_scipy(model: Model) -> Any:
-    """See `Model.to_scipy`."""
-    from scipy.signal import StateSpace
-
-    return StateSpace(*with_delays(model), dt=model.dt)

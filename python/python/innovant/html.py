@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from html import escape
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .explanation import Explanation
-    from .model import Model
+from .record import Record
+from .responses import Roots
 
 
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    line = lambda cells, tag: "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table of text."""
+
+    def line(cells: Sequence[str], tag: str) -> str:
+        return "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+
     return f"<table><thead>{line(head, 'th')}</thead><tbody>{''.join(line(row, 'td') for row in rows)}</tbody></table>"
 
 
@@ -29,9 +31,8 @@ def _number(value: float, std: float) -> str:
     return f"{value:.4g}" if not np.isfinite(std) else f"{value:.4g} ± {std:.2g}"
 
 
-def model(shown: Model) -> str:
+def model(verdict: str, poles: Roots, warnings: Sequence[str]) -> str:
     """Verdict, poles, warnings."""
-    poles = shown.poles()
     rows = [
         (
             f"{value.real:.4f} {'+' if value.imag > 0 else '-'} {abs(value.imag):.4f}j" if value.imag else f"{value.real:.4f}",
@@ -43,15 +44,16 @@ def model(shown: Model) -> str:
         if value.imag >= 0
     ]
     head = ("pole", "natural frequency [rad/s]", "damping", "time constant [s]")
-    return f"<p><b>{escape(shown.verdict)}</b></p>{_table(head, rows)}{_list(shown.warnings)}"
+    return f"<p><b>{escape(verdict)}</b></p>{table(head, rows)}{_list(warnings)}"
 
 
-def explanation(shown: Explanation) -> str:
-    """Verdict, what was found, what else was tried."""
-    said = "".join(f"<p>{escape(line)}</p>" for line in shown.summary)
-    found = _list([effect.sentence for effect in shown.effects])
-    rivals = _table(
-        ("not this", "because"), [(rival.effect.replace("_", " "), rival.why_not) for rival in shown.alternatives]
+def explanation(shown: Record) -> str:
+    """Verdict, what was found, what else was tried, of a document `innovant-explanation/1`."""
+    said = "".join(f"<p>{escape(line)}</p>" for line in shown["summary"])
+    found = _list([effect["sentence"] for effect in shown["effects"]])
+    alternatives = shown["alternatives"]
+    rivals = table(
+        ("not this", "because"), [(rival["effect"].replace("_", " "), rival["why_not"]) for rival in alternatives]
     )
-    title = f"<p><b>{escape(shown.verdict)}</b>, probability {shown.probability:.2f}</p>"
-    return title + said + found + (rivals if shown.alternatives else "")
+    title = f"<p><b>{escape(shown['verdict'])}</b>, probability {shown['probability']:.2f}</p>"
+    return title + said + found + (rivals if alternatives else "")

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _innovant, control, frames, html
+from . import _innovant, control, frames, html, model_plots
 from ._innovant import InnovantError
-from .frames import Array
+from .documents import document, written
+from .frames import Array, without_unit
 from .record import Record, read
 from .responses import FrequencyResponse, Roots, StepResponse
 from .validation import Validation
@@ -51,12 +52,12 @@ class Model:
         dt: float,
     ) -> None:
         given = {"A": A, "B": B, "C": C, "D": D, "K": K}
-        document: dict[str, Any] = {
-            name: np.atleast_2d(np.asarray(matrix, dtype=np.float64)).tolist()
+        matrices: dict[str, Any] = {
+            name: np.atleast_2d(frames.numbers(matrix, name)).tolist()
             for name, matrix in given.items()
             if matrix is not None
         }
-        self._core = _innovant.Model.from_json("model", json.dumps({**document, "dt": float(dt)}))
+        self._core = _innovant.Model.from_json("model", json.dumps({**matrices, "dt": float(dt)}))
 
     @classmethod
     def _of(cls, core: _innovant.Model) -> Model:
@@ -134,12 +135,16 @@ class Model:
     @property
     def input_labels(self) -> list[str]:
         """Names of the inputs, without units."""
-        return [_without_unit(name) for name in self._core.names()[0]]
+        return [without_unit(name) for name in self._core.names()[0]]
 
     @property
     def output_labels(self) -> list[str]:
         """Names of the outputs, without units."""
-        return [_without_unit(name) for name in self._core.names()[1]]
+        return [without_unit(name) for name in self._core.names()[1]]
+
+    def headers(self) -> tuple[list[str], list[str]]:
+        """Names of the inputs and of the outputs, with units: ``force [N]``."""
+        return self._core.names()
 
     @property
     def input_levels(self) -> Array:
@@ -183,11 +188,11 @@ class Model:
         >>> bool(numpy.all(numpy.abs(poles) < 1)), poles.covariance.shape
         (True, (3, 2, 2))
         """
-        return _roots(_innovant.poles(self._core))
+        return _roots(_innovant.poles(self._core), "poles")
 
     def zeros(self) -> Roots:
         """Invariant zeros from inputs to outputs, as `poles`."""
-        return _roots(_innovant.zeros(self._core))
+        return _roots(_innovant.zeros(self._core), "zeros")
 
     def frequency_response(self, omega: ArrayLike | None = None) -> FrequencyResponse:
         """Response from inputs to outputs at `omega` (rad/s; default: a logarithmic grid up to Nyquist), with bands.
@@ -208,7 +213,9 @@ class Model:
         if omega is None:
             grid = _innovant.default_frequencies(self._core)
         else:
-            grid = np.atleast_1d(np.asarray(omega, dtype=np.float64))
+            grid = np.atleast_1d(frames.numbers(omega, "omega"))
+            if grid.ndim != 1:
+                raise InnovantError(f"omega has the shape {grid.shape}; expected frequencies in one dimension, in rad/s")
         nyquist = np.pi / self.dt
         # A Nyquist frequency that was typed is rounded.
         beyond = grid[(grid > nyquist * (1 + 1e-3)) | (grid < 0) | ~np.isfinite(grid)]
@@ -219,7 +226,12 @@ class Model:
             )
         response, covariance, bands = _innovant.frequency_response(self._core, grid, noise)
         magnitude_95, magnitude_99, phase_95 = bands or (None, None, None)
-        return FrequencyResponse(grid, response, covariance, magnitude_95, magnitude_99, phase_95)
+        inputs, outputs = self._core.names()
+        if noise:
+            inputs = [f"e({name})" for name in map(without_unit, outputs)]
+        return FrequencyResponse(
+            grid, response, covariance, magnitude_95, magnitude_99, phase_95, inputs, outputs, self.dt
+        )
 
     def step_response(self, samples: int | None = None) -> StepResponse:
         """Response to a unit step of each input from rest, with standard deviations.
@@ -228,7 +240,8 @@ class Model:
         """
         count = samples if samples is not None else _innovant.settling_samples(self._core, LONGEST_STEP_RESPONSE)
         values, std = _innovant.step_response(self._core, count)
-        return StepResponse(np.arange(count, dtype=np.float64) * np.float64(self.dt), values, std)
+        time = np.arange(count, dtype=np.float64) * np.float64(self.dt)
+        return StepResponse(time, values, std, *self._core.names())
 
     def static_gain(self) -> tuple[Array, Array | None] | None:
         """Static gain and its standard deviation, outputs x inputs; `None` with an integrator."""
@@ -248,8 +261,8 @@ class Model:
         >>> model.simulate(u, x0=model.initial_state(u, y)).shape
         (4000, 1)
         """
-        inputs = frames.by_names(u, self._core.names()[0], "u")
-        return frames.like(u, self._core.simulate(inputs, _state(x0)), self._core.names()[1])
+        inputs = frames.by_names(u, self._core.names()[0], "u", dt=self.dt)
+        return frames.like(u, self._core.simulate(inputs, self._state(x0)), self._core.names()[1])
 
     def predict(self, u: Any, y: Any = None, x0: ArrayLike | None = None) -> Any:
         """One-step predictions of the outputs, in the units of the recording.
@@ -258,7 +271,8 @@ class Model:
         the one that fits best without it.
         """
         inputs, outputs = self._pair(u, y)
-        return frames.like(u if y is None else y, self._core.predict(inputs, outputs, _state(x0)), self._core.names()[1])
+        predicted = self._core.predict(inputs, outputs, self._state(x0))
+        return frames.like(u if y is None else y, predicted, self._core.names()[1])
 
     def initial_state(self, u: Any, y: Any = None) -> Array:
         """The state at the first sample that explains a recording best."""
@@ -293,44 +307,70 @@ class Model:
         >>> model.validate(u, y).rejected
         False
         """
-        us = frames.experiments(u)
-        ys = [None] * len(us) if y is None else frames.experiments(y)
-        if len(us) != len(ys):
-            raise InnovantError(f"{len(us)} experiments in u and {len(ys)} in y: give one of each for every experiment")
-        pairs = [self._pair(*pair) for pair in zip(us, ys)]
-        document, text = self._core.validate(
+        pairs = [self._pair(first, second, which) for first, second, which in frames.pairs(u, y)]
+        judged, text = self._core.validate(
             [pair[0] for pair in pairs], [pair[1] for pair in pairs], level, detrend, fresh
         )
-        return Validation(text, document)
+        return Validation(text, judged)
 
-    def _pair(self, u: Any, y: Any) -> tuple[Array, Array]:
+    def _pair(self, u: Any, y: Any, which: str = "") -> tuple[Array, Array]:
         inputs, outputs = self._core.names()
-        return frames.by_names(u, inputs, "u"), frames.by_names(u if y is None else y, outputs, "y")
+        measured = u if y is None else y
+        if y is None and not frames.is_frame(u):
+            raise InnovantError("y is missing: give u and y as arrays, or one data frame with the columns of both")
+        first = frames.by_names(u, inputs, "u", label=f"u{which}", dt=self.dt)
+        second = frames.by_names(measured, outputs, "y", label=f"y{which}", dt=self.dt)
+        frames.check_rows(first, second, which)
+        return first, second
+
+    def _state(self, x0: ArrayLike | None) -> Array | None:
+        return None if x0 is None else frames.vector(x0, "x0", self.order, "state")
+
+    # -- plots
+
+    def plot(self, omega: ArrayLike | None = None, *, ax: Any = None, label: str | None = None) -> Any:
+        """Bode diagram of the inputs with 95 % bands: `frequency_response`, and its `plot`. Needs matplotlib.
+
+        Other plots of a model: ``poles().plot()``, ``step_response().plot()``, ``validate(u, y).plot()`` for the
+        residuals, and `innovant.compare` for measured and simulated outputs.
+
+        >>> import innovant
+        >>> innovant.Model([[0.9]], [[0.1]], [[1.0]], dt=0.01).plot().shape
+        (2, 1)
+        """
+        return self.frequency_response(omega).plot(ax, label=label)
 
     # -- elsewhere
 
     def to_control(self) -> python_control.StateSpace:
         """python-control's StateSpace from inputs to outputs, known delays included; deviations from the levels."""
-        return control.to_control(self)
+        import control as python_control
+
+        return python_control.StateSpace(
+            *self._with_delays(), self.dt, inputs=self.input_labels, outputs=self.output_labels
+        )
 
     def to_scipy(self) -> scipy.signal.StateSpace:
         """scipy's discrete StateSpace from inputs to outputs, known delays included; deviations from the levels."""
-        return control.to_scipy(self)
+        from scipy.signal import StateSpace
+
+        return StateSpace(*self._with_delays(), dt=self.dt)
+
+    def _with_delays(self) -> tuple[Array, Array, Array, Array]:
+        return control.with_delays(self.A, self.B, self.C, self.D, self.input_delays)
 
     def plot_bode(self, omega: ArrayLike | None = None, *, backend: Literal["plotly", "matplotlib"] = "plotly") -> Any:
         """Magnitude and phase with their 95 % bands; a figure of plotly or of matplotlib."""
-        from . import plots
-
-        return plots.bode(self, omega, backend)
+        response = self.frequency_response(omega)
+        curves = [curve for row in response.curves() for curve in row]
+        return model_plots.bode(curves, response.frequency, backend)
 
     def plot_poles(self, *, backend: Literal["plotly", "matplotlib"] = "plotly") -> Any:
         """Poles with their 95 % ellipses, and zeros; a figure of plotly or of matplotlib."""
-        from . import plots
-
-        return plots.poles(self, backend)
+        return model_plots.poles(self.poles(), self.zeros(), backend)
 
     def report(self, path: str | Path) -> None:
-        """Write the page with pictures: one HTML file that opens offline.
+        """Write the page with plots: one HTML file that opens offline.
 
         What the recording looked like is on the page of the command line only; a model does not keep it.
         """
@@ -362,34 +402,10 @@ class Model:
         return self._core.text()
 
     def _repr_html_(self) -> str:
-        return html.model(self)
+        return html.model(self.verdict, self.poles(), self.warnings)
 
 
-def document(source: str | Path) -> tuple[str, str]:
-    """Name and text of a document, or of the file that it is in."""
-    if isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("{"):
-        return "document", source
-    try:
-        return str(source), Path(source).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InnovantError(f"{source}: cannot open: {error}; check the path and its permissions") from None
-
-
-def written(text: str, path: str | Path | None) -> str:
-    """The text of a document, which a file is given as well where there is a path."""
-    if path is not None:
-        Path(path).write_text(text, encoding="utf-8")
-    return text
-
-
-def _without_unit(header: str) -> str:
-    return header.rsplit(" [", 1)[0] if header.endswith("]") else header
-
-
-def _state(x0: ArrayLike | None) -> Array | None:
-    return None if x0 is None else np.asarray(x0, dtype=np.float64).reshape(-1)
-
-
-def _roots(found: tuple[Any, Array, Sequence[Array]]) -> Roots:
+def _roots(found: tuple[Any, Array, Sequence[Array]], kind: str) -> Roots:
     values, covariance, columns = found
-    return Roots(values, covariance, *columns)
+    frequency, frequency_std, damping, damping_std, constant, constant_std = columns
+    return Roots(values, covariance, frequency, frequency_std, damping, damping_std, constant, constant_std, kind)

@@ -60,7 +60,7 @@ class Moments:
         keep: int = SAMPLES_KEPT,
         **options: Any,
     ) -> None:
-        data = frames.recordings(u, y, dt=dt, inputs=inputs, outputs=outputs, time=time)
+        data = frames.recordings(u, y, dt=dt, inputs=inputs, outputs=outputs, time=time, few=True)
         if len(data.u) != 1:
             raise InnovantError("one recording at a time: make moments of each, and add them")
         self._options = options

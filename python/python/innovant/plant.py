@@ -1,4 +1,4 @@
-"""Plants in equations: flat Modelica, simulated and estimated."""
+"""Plants in equations: flat Modelica, simulated, estimated and judged."""
 
 from __future__ import annotations
 
@@ -6,21 +6,16 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from . import _innovant
-
-
-class EstimatedParameter(NamedTuple):
-    """A parameter with its uncertainty."""
-
-    value: float
-    #: Standard deviation; None where the recordings do not determine it.
-    std: float | None
-    #: 95 % interval; None where it is open.
-    interval_95: tuple[float | None, float | None]
+from . import _innovant, frames
+from ._innovant import InnovantError
+from .estimate import Estimate
+from .frames import Array
+from .linearisation import Linearisation
+from .validation import PlantValidation
 
 
 def _text(source: str | os.PathLike[str]) -> tuple[str, str]:
@@ -28,22 +23,6 @@ def _text(source: str | os.PathLike[str]) -> tuple[str, str]:
     if isinstance(source, str) and ("\n" in source or source.lstrip().startswith(("model", "{"))):
         return "plant", source
     return str(source), Path(source).read_text(encoding="utf-8")
-
-
-def _columns(values: Any, names: Sequence[str], what: str) -> np.ndarray:
-    """Samples x channels."""
-    array = np.asarray(values, dtype=float)
-    if array.ndim == 1:
-        array = array[:, None]
-    if array.ndim != 2 or array.shape[1] != len(names):
-        raise _innovant.InnovantError(
-            f"{what} has the shape {array.shape}; it is samples x {len(names)} ({', '.join(names) or 'none'})"
-        )
-    return array
-
-
-def _recordings(values: Any) -> list[Any]:
-    return list(values) if isinstance(values, (list, tuple)) and len(values) and np.ndim(values[0]) > 0 else [values]
 
 
 class Plant:
@@ -67,6 +46,11 @@ class Plant:
         self._plant = _innovant.Plant(name, text)
 
     @property
+    def name(self) -> str:
+        """Name of the plant in its text."""
+        return self._plant.name()
+
+    @property
     def inputs(self) -> list[str]:
         """Names of the inputs."""
         return self._plant.inputs()
@@ -75,6 +59,10 @@ class Plant:
     def outputs(self) -> list[str]:
         """Names of the outputs."""
         return self._plant.outputs()
+
+    def headers(self) -> tuple[list[str], list[str]]:
+        """Names of the inputs and of the outputs, with units: ``torque [N.m]``."""
+        return self._plant.headers()
 
     @property
     def states(self) -> list[str]:
@@ -86,45 +74,80 @@ class Plant:
         """Parameters that may be changed, with their values."""
         return dict(self._plant.parameters())
 
+    @property
+    def hold(self) -> str:
+        """How inputs behave between samples: ``zero``, or ``linear`` if they were in the estimation."""
+        return self._plant.hold_name()
+
     def simulate(
         self,
         u: Any,
-        dt: float,
+        dt: float | None = None,
         parameters: Mapping[str, float] | None = None,
         start: Mapping[str, float] | None = None,
         hold: str = "zero",
         start_time: float = 0.0,
-    ) -> np.ndarray:
-        """Outputs, samples x channels, for inputs ``u`` (samples x channels; for a plant without inputs the number of
-        samples). ``start`` gives initial states by name; the others are those of the text."""
-        inputs = np.empty((u, 0)) if isinstance(u, int) else _columns(u, self.inputs, "u")
+    ) -> Array:
+        """Outputs, samples x channels, for inputs ``u`` (samples x channels or a frame with columns of their names; for a
+        plant without inputs the number of samples). ``dt`` is the sample time in seconds, which the time index of a pandas
+        frame gives without it. ``start`` gives initial states by name; the others are those of the text."""
+        step = frames.sample_time(u, dt)
         return self._plant.simulate(
-            inputs, dt, start_time, list((parameters or {}).items()), list((start or {}).items()), hold
+            self._inputs(u), step, start_time, list((parameters or {}).items()), list((start or {}).items()), hold
         )
 
     def fit(
         self,
         u: Any,
-        y: Any,
-        dt: float,
+        y: Any = None,
+        dt: float | None = None,
         fix: Sequence[str] = (),
         hold: str = "zero",
         form: str | None = None,
         least_squares: bool = False,
     ) -> PlantEstimate:
-        """Estimates parameters and initial states by maximum likelihood. Lists of arrays are several recordings.
-        ``form`` is ``"free run"``, ``"innovation"`` or the likelier (None); ``least_squares`` fits the free run as if its
-        error were white."""
-        us = [_columns(a, self.inputs, "u") for a in _recordings(u)]
-        ys = [_columns(a, self.outputs, "y") for a in _recordings(y)]
-        if len(us) != len(ys):
-            raise _innovant.InnovantError(f"u holds {len(us)} recordings and y {len(ys)}")
-        document, text = self._plant.fit(us, ys, dt, list(fix), hold, form, least_squares)
-        return PlantEstimate(document, text, (us, ys, dt))
+        """Estimates parameters and initial states by maximum likelihood. Lists of arrays are several recordings; a frame
+        with the columns of inputs and outputs stands for both. ``form`` is ``"free run"``, ``"innovation"`` or the likelier
+        (None); ``least_squares`` fits the free run as if its error were white."""
+        data = self._recordings(u, y, dt)
+        fixed = [fix] if isinstance(fix, str) else list(fix)
+        document, text = self._plant.fit(data.u, data.y, data.dt, fixed, hold, form, least_squares)
+        return PlantEstimate(document, text, (data.u, data.y, data.dt))
+
+    def initial_state(self, u: Any, y: Any = None, dt: float | None = None, hold: str | None = None) -> dict[str, float]:
+        """The initial states that fit a recording best in free run, for ``simulate(..., start=...)``."""
+        data = self._recordings(u, y, dt)
+        if len(data.u) != 1:
+            raise InnovantError(f"{len(data.u)} recordings in u; expected one")
+        return dict(self._plant.initial_state(data.u[0], data.y[0], data.dt, hold))
+
+    def validate(
+        self,
+        u: Any,
+        y: Any = None,
+        dt: float | None = None,
+        *,
+        level: float = 0.01,
+        hold: str | None = None,
+    ) -> PlantValidation:
+        """Judges the plant on recordings that it was not estimated from: fit, tests of the residuals. Initial states are
+        estimated; ``level`` is the probability that a right plant is rejected. The parameters of an estimate have their
+        uncertainty, those of a text are taken as known."""
+        data = self._recordings(u, y, dt)
+        document, text, simulated, predicted = self._plant.validate(data.u, data.y, data.dt, hold, level, False)
+        return PlantValidation(text, document, data.dt, data.y, simulated, predicted, self.headers()[1])
+
+    def _inputs(self, u: Any) -> Array:
+        if isinstance(u, (int, np.integer)) and not self.inputs:
+            return np.empty((int(u), 0))
+        return frames.by_names(u, self.inputs, "u")
+
+    def _recordings(self, u: Any, y: Any, dt: float | None) -> frames.Recordings:
+        return frames.known_recordings(u, y, dt=dt, inputs=self.inputs, outputs=self.outputs)
 
     def linearise(
         self, state: Mapping[str, float] | None = None, inputs: Sequence[float] | None = None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    ) -> tuple[Array, Array, Array, Array]:
         """Continuous-time ``A, B, C, D`` at a state (those not given are the start values of the text) and inputs (zero);
         ``control.ss(*plant.linearise())`` is a system of python-control."""
         return self._plant.linearise(list((state or {}).items()), self._given(inputs))
@@ -134,13 +157,14 @@ class Plant:
         state: Mapping[str, float] | None = None,
         inputs: Sequence[float] | None = None,
         frequencies: Sequence[float] = (),
-    ) -> dict[str, Any]:
+    ) -> Linearisation:
         """The document ``innovant-linearisation/1``: ``poles`` (natural frequency, damping, time constant),
         ``static_gain`` and ``frequency_response`` (``frequencies`` in rad/s; a grid about the poles) at the equilibrium
         with these inputs (zero), or at a state. Those of an estimate have standard deviations and bands, which follow
-        from the covariance of the parameters."""
+        from the covariance of the parameters. Its `plot` is a Bode diagram."""
         at = None if state is None else list(state.items())
-        return json.loads(self._plant.linearisation(at, self._given(inputs), [float(w) for w in frequencies]))
+        document = self._plant.linearisation(at, self._given(inputs), [float(w) for w in frequencies])
+        return Linearisation(json.loads(document), *self.headers())
 
     def to_modelica(self) -> str:
         """The equations with the values of the parameters."""
@@ -163,45 +187,20 @@ class Plant:
         return self._plant.text()
 
 
-class Estimate:
-    """What was estimated: of a plant in equations, or of a simulator."""
-
-    def __init__(self, document: str, text: str) -> None:
-        self._json = document
-        self._text = text
-        #: The document ``innovant-plant/1``.
-        self.document: dict[str, Any] = json.loads(document)
-
-    @property
-    def estimates(self) -> dict[str, EstimatedParameter]:
-        """The estimated parameters."""
-        return {
-            p["name"]: EstimatedParameter(p["value"], p["std"], tuple(p["interval_95"]))
-            for p in self.document["parameters"]
-        }
-
-    @property
-    def undetermined(self) -> list[str]:
-        """What the recordings do not determine, in words."""
-        return list(self.document["undetermined"])
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the document."""
-        Path(path).write_text(self._json, encoding="utf-8")
-
-    def __str__(self) -> str:
-        return self._text
-
-
 class PlantEstimate(Estimate, Plant):
     """A plant with estimated parameters."""
 
-    def __init__(self, document: str, text: str, recordings: tuple[list[np.ndarray], list[np.ndarray], float]) -> None:
-        Estimate.__init__(self, document, text)
+    def __init__(self, document: str, text: str, recordings: tuple[list[Array], list[Array], float]) -> None:
         Plant.__init__(self, document)
-        self._recordings = recordings
+        Estimate.__init__(self, document, text, recordings[1], recordings[2], self.headers()[1])
+        self._recordings_used = recordings
+
+    def _simulated(self) -> list[Array]:
+        us, ys, dt = self._recordings_used
+        _, _, simulated, predicted = self._plant.validate(us, ys, dt, None, 0.01, True)
+        return predicted if simulated is None else simulated
 
     def report(self, path: str | os.PathLike[str]) -> None:
         """Writes a page: parameters, recorded and simulated outputs, residuals and equations, in one file that opens
         offline."""
-        Path(path).write_text(self._plant.page(*self._recordings), encoding="utf-8")
+        Path(path).write_text(self._plant.page(*self._recordings_used), encoding="utf-8")

@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 
-class Record(dict):
+class Record(dict[str, Any]):
     """A part of a document: a dict whose keys are attributes too.
 
     >>> Record({"fit": {"percent": 91.5}}).fit.percent
@@ -26,7 +26,7 @@ class Record(dict):
         return [*super().__dir__(), *(key for key in self if isinstance(key, str))]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Record, (dict(self),)
+        return type(self), (dict(self),)
 
 
 def _nested(value: Any) -> Any:

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from . import _innovant
-from .plant import Estimate, _columns, _recordings
+from . import _innovant, frames
+from .estimate import Estimate
+from .frames import Array
 
 
 def _parameter(name: str, given: Any) -> tuple[str, float, float, float]:
@@ -74,10 +75,12 @@ class Simulator:
         """Names of the inputs, as many as ``u`` has columns where none were given."""
         if self.inputs is not None:
             return self.inputs
+        if frames.is_frame(u):
+            raise _innovant.InnovantError("a frame needs the names of the columns: Simulator(..., inputs=[...])")
         count = np.shape(u)[1] if np.ndim(u) == 2 else 1
         return ["u"] if count == 1 else [f"u{i + 1}" for i in range(count)]
 
-    def _call(self, u: np.ndarray, values: Mapping[str, float]) -> np.ndarray:
+    def _call(self, u: Array, values: Mapping[str, float]) -> Array:
         """Calls the function, and checks what it returns."""
         samples, count = len(u), len(self.outputs)
         y = np.asarray(self.function(u[:, 0] if u.shape[1] == 1 else u, **values), dtype=float)
@@ -93,45 +96,49 @@ class Simulator:
             )
         return np.ascontiguousarray(y)
 
-    def simulate(self, u: Any, parameters: Mapping[str, float] | None = None) -> np.ndarray:
+    def simulate(self, u: Any, parameters: Mapping[str, float] | None = None) -> Array:
         """Outputs, samples x outputs; parameters that are not given keep their values."""
         values = self.parameters | dict(parameters or {})
-        return self._call(_columns(u, self._names(u), "u"), values)
+        return self._call(frames.by_names(u, self._names(u), "u"), values)
 
     def fit(
         self,
         u: Any,
-        y: Any,
-        dt: float,
+        y: Any = None,
+        dt: float | None = None,
         fix: Sequence[str] = (),
         least_squares: bool = False,
     ) -> SimulatorEstimate:
         """Estimates the parameters in free run by maximum likelihood under coloured noise, or by least squares. Lists of
-        arrays are several recordings."""
-        us, ys = _recordings(u), _recordings(y)
-        if len(us) != len(ys):
-            raise _innovant.InnovantError(f"u holds {len(us)} recordings and y {len(ys)}")
-        inputs = self._names(us[0])
+        arrays are several recordings; a frame with the columns of inputs and outputs stands for both."""
+        inputs = self._names(frames.experiments(u)[0])
+        data = frames.known_recordings(u, y, dt=dt, inputs=inputs, outputs=self.outputs)
         document, text = _innovant.estimate_simulator(
             self._call,
             getattr(self.function, "__name__", "simulator"),
             inputs,
             self.outputs,
             self._parameters,
-            [_columns(a, inputs, "u") for a in us],
-            [_columns(a, self.outputs, "y") for a in ys],
-            dt,
+            data.u,
+            data.y,
+            data.dt,
             [fix] if isinstance(fix, str) else list(fix),
             least_squares,
         )
-        return SimulatorEstimate(self, document, text)
+        return SimulatorEstimate(self, document, text, (data.u, data.y, data.dt))
 
 
 class SimulatorEstimate(Estimate, Simulator):
     """A simulator with estimated parameters."""
 
-    def __init__(self, simulator: Simulator, document: str, text: str) -> None:
-        Estimate.__init__(self, document, text)
+    def __init__(
+        self, simulator: Simulator, document: str, text: str, recordings: tuple[list[Array], list[Array], float]
+    ) -> None:
+        Estimate.__init__(self, document, text, recordings[1], recordings[2], simulator.outputs)
+        self._recorded_inputs = recordings[0]
         values = {p["name"]: p["value"] for p in self.document["simulator"]["parameters"]}
         given = {name: (values[name], low, high) for name, _, low, high in simulator._parameters}
         Simulator.__init__(self, simulator.function, given, simulator.outputs, simulator.inputs)
+
+    def _simulated(self) -> list[Array]:
+        return [self._call(u, self.parameters) for u in self._recorded_inputs]
