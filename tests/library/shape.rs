@@ -369,7 +369,7 @@ fn names_of_files_are_not_repeated() {
     let all = sources(&src);
     let beside = |file: &&PathBuf| {
         let listed = |folder: &&str| file.starts_with(src.join(folder));
-        !REPEATING.iter().any(|folder| listed(&folder))
+        !REPEATING.iter().any(listed)
     };
     let found = repeated(all.iter().filter(beside));
     assert!(found.is_empty(), "{found:#?}");
