@@ -17,5 +17,6 @@ mod projection;
 pub(crate) mod scope;
 pub(crate) mod screen;
 pub(crate) mod search;
+mod second_effect;
 pub(crate) mod select;
 pub(crate) mod values;

@@ -9,10 +9,10 @@ use super::finish::finished;
 use super::fitted::{Fitted, TIE, order, searched, with_more};
 use super::holdout::HeldOut;
 use super::hypothesis::{Ground, Trial, trials};
-use super::library::Port;
-use super::names::{SPECIFIC, called, family, named, rank_of};
+use super::names::{SPECIFIC, named, rank_of};
 use super::scope::Scope;
 use super::screen::{Lead, Screen, screen};
+use super::second_effect::{determined, differs, drop_alike};
 use crate::physics::estimate::{
     Effort, EstimateError, EstimateOptions, Fit, Form, PlantRecording, Study,
 };
@@ -59,9 +59,6 @@ pub(crate) const SURE: f64 = 24.0;
 const FORETOLD: f64 = 0.25;
 /// A second effect must gain more, and at least this part of the first.
 pub(super) const SECOND: (f64, f64) = (30.0, 0.12);
-/// ... and its strength must differ from 0 by so many standard deviations with all parameters free, whatever their bounds (p =
-/// 0.001): what a parameter would do beyond its bound is no second effect.
-const DETERMINED: f64 = 3.3;
 /// Level of the test that asks for one: of all score tests together.
 pub(crate) const LEFT: f64 = 0.01;
 /// A better fit of the plant itself is taken from here on, and so often at most.
@@ -214,52 +211,6 @@ fn improved(stage: &Stage, fitted: &[Fitted]) -> Option<Fit> {
         })
         .filter(|again| again.criterion < stage.fit.criterion - BETTER)
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
-}
-
-/// Whether a term may be named beside an effect. It must have a name of its own: a function without a name may be what is left of
-/// the first; and it must not be a function of the same variables at the same kind of place, which may be the part that the
-/// formula of the first leaves (math/physics.md, "Fits and decision", 8).
-fn differs(id: &str, port: Port, depends: &[String], (first, its_id): (&Fitted, &str)) -> bool {
-    let kind = |port: Port| match port {
-        Port::Equation | Port::Parameter => Port::Equation,
-        port => port,
-    };
-    let repeats =
-        !depends.is_empty() && depends == first.depends && kind(port) == kind(first.lead.term.port);
-    !matches!(id, "law" | "cross_coupling" | "viscous_friction")
-        && family(id) != family(its_id)
-        && !repeats
-}
-
-/// Whether the strength of a term differs from 0 by more than the parameters leave open.
-fn determined(study: &Study, found: &Fitted, options: &EstimateOptions) -> bool {
-    if !found.lead.term.free_strength {
-        return true;
-    }
-    let options = with_more(options, found.candidate.values.len());
-    let at = options.free.len() - 1;
-    study.of(&found.candidate.plant, &options).is_ok_and(|own| {
-        let variance = own.covariance(&found.fit)[(at, at)];
-        found.fit.point[at].abs() > DETERMINED * variance.sqrt()
-    })
-}
-
-/// Drops what may not be named beside an effect, but for the best term and the best curve: what these explain as well is no
-/// evidence of another.
-fn drop_alike(screen: &mut Screen, spec: &ModelSpec, first: (&Fitted, &str)) {
-    let arguments = &screen.arguments;
-    let mut taken = [false; 2];
-    let mut keep = |lead: &Lead| {
-        let variables = lead.argument.map_or(&[][..], |a| &arguments[a].variables);
-        let id = called(spec, lead.term, lead.place, variables);
-        let depends = spec.names(variables);
-        if differs(id, lead.term.port, &depends, first) {
-            return true;
-        }
-        !std::mem::replace(&mut taken[usize::from(lead.curve.is_some())], true)
-    };
-    screen.leads.retain(&mut keep);
-    screen.curves.retain(&mut keep);
 }
 
 /// Fits the leads of a plant; best first. Also the strongest test, and how many there were.

@@ -1,0 +1,63 @@
+//! What may be named beside an effect that was found.
+
+use super::fitted::{Fitted, with_more};
+use super::library::Port;
+use super::names::{called, family};
+use super::screen::{Lead, Screen};
+use crate::physics::ModelSpec;
+use crate::physics::estimate::{EstimateOptions, Study};
+
+/// The strength of a second effect must differ from 0 by so many standard deviations with all parameters free, whatever their
+/// bounds (p = 0.001): what a parameter would do beyond its bound is no second effect.
+const DETERMINED: f64 = 3.3;
+
+/// Whether a term may be named beside an effect. It must have a name of its own: a function without a name may be what is left of
+/// the first; and it must not be a function of the same variables at the same kind of place, which may be the part that the
+/// formula of the first leaves (math/physics.md, "Fits and decision", 8).
+pub(super) fn differs(
+    id: &str,
+    port: Port,
+    depends: &[String],
+    (first, its_id): (&Fitted, &str),
+) -> bool {
+    let kind = |port: Port| match port {
+        Port::Equation | Port::Parameter => Port::Equation,
+        port => port,
+    };
+    let repeats =
+        !depends.is_empty() && depends == first.depends && kind(port) == kind(first.lead.term.port);
+    !matches!(id, "law" | "cross_coupling" | "viscous_friction")
+        && family(id) != family(its_id)
+        && !repeats
+}
+
+/// Whether the strength of a term differs from 0 by more than the parameters leave open.
+pub(super) fn determined(study: &Study, found: &Fitted, options: &EstimateOptions) -> bool {
+    if !found.lead.term.free_strength {
+        return true;
+    }
+    let options = with_more(options, found.candidate.values.len());
+    let at = options.free.len() - 1;
+    study.of(&found.candidate.plant, &options).is_ok_and(|own| {
+        let variance = own.covariance(&found.fit)[(at, at)];
+        found.fit.point[at].abs() > DETERMINED * variance.sqrt()
+    })
+}
+
+/// Drops what may not be named beside an effect, but for the best term and the best curve: what these explain as well is no
+/// evidence of another.
+pub(super) fn drop_alike(screen: &mut Screen, spec: &ModelSpec, first: (&Fitted, &str)) {
+    let arguments = &screen.arguments;
+    let mut taken = [false; 2];
+    let mut keep = |lead: &Lead| {
+        let variables = lead.argument.map_or(&[][..], |a| &arguments[a].variables);
+        let id = called(spec, lead.term, lead.place, variables);
+        let depends = spec.names(variables);
+        if differs(id, lead.term.port, &depends, first) {
+            return true;
+        }
+        !std::mem::replace(&mut taken[usize::from(lead.curve.is_some())], true)
+    };
+    screen.leads.retain(&mut keep);
+    screen.curves.retain(&mut keep);
+}
