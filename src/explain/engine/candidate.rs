@@ -58,7 +58,7 @@ pub(crate) fn candidate(
     for (shape, &value) in term.shapes.iter().zip(&lead.shapes) {
         let name = free_name(spec, &format!("{}_{}", term.id, shape.symbol));
         let (min, max) = match shape.starts {
-            Starts::Length(_) if !shape.positive => {
+            Starts::Instants(_) => {
                 let length = recordings.iter().map(|r| r.outputs[0].len()).max()? as f64 * h;
                 let begin = recordings.first()?.start_time;
                 (begin, begin + length)

@@ -3,50 +3,12 @@
 use rayon::prelude::*;
 
 use super::fitted::{Fitted, searched, with_more};
-use super::library::Starts;
 use super::names::{SPECIFIC, rank};
 use super::search::{FINISHED, MOST_STEPS, ROUNDS, THOROUGH};
-use crate::physics::estimate::{Effort, EstimateOptions, Fit, PlantRecording, Study};
+use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 
 /// Names that gain this part of the best are finished too.
 const HALF: f64 = 0.5;
-/// Times of a change that are tried on either side, and no step of a fit.
-const TIMES: usize = 10;
-const AS_IT_IS: Effort = Effort {
-    iterations: 0,
-    settled: 0.0,
-    attempts: 0,
-};
-
-/// A fit with the time of its change moved where that is better: between the times that were tested there are more optima than
-/// one, and descent ends in the nearest.
-fn at_its_time(study: &Study, f: &Fitted) -> Fit {
-    let mut best = f.fit.clone();
-    let first = study.parameters() - f.candidate.values.len();
-    for (i, shape) in f.lead.term.shapes.iter().enumerate() {
-        let Starts::Length(parts) = shape.starts else {
-            continue;
-        };
-        if shape.positive {
-            continue;
-        }
-        let apart = study.duration() * (parts[1] - parts[0]);
-        let from = f.fit.point[first + i];
-        for k in 1..=TIMES {
-            for sign in [-1.0, 1.0] {
-                let mut trial = f.fit.clone();
-                trial.point[first + i] = from + sign * apart * k as f64 / TIMES as f64;
-                if let Some(moved) = study.refit(&trial, 0, AS_IT_IS)
-                    && moved.deviance < best.deviance
-                {
-                    best = moved;
-                }
-            }
-        }
-    }
-    best
-}
-
 /// The best of all fits, fitted until nothing changes; the others as they are. Best first.
 pub(super) fn finished(
     mut fitted: Vec<Fitted>,
@@ -70,7 +32,7 @@ pub(super) fn finished(
             let options = with_more(options, f.candidate.values.len());
             let limited = f.candidate.plant.clone().with_most_steps(MOST_STEPS);
             let inner = study.of(&limited, &options).ok()?;
-            inner.refit(&at_its_time(&inner, f), ROUNDS, THOROUGH)
+            inner.refit(&f.fit, ROUNDS, THOROUGH)
         })
         .collect();
     for (f, refined) in fitted.iter_mut().zip(refined) {

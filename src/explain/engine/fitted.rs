@@ -71,7 +71,7 @@ pub(super) fn searched(lead: &Lead, recordings: &[PlantRecording]) -> f64 {
         .shapes
         .iter()
         .map(|shape| match shape.starts {
-            Starts::Length(_) => 2.0 * (samples / 20.0).ln(),
+            Starts::Length(_) | Starts::Instants(_) => 2.0 * (samples / 20.0).ln(),
             Starts::Waves(_) => 7.0,
             // As many frequencies as the spectrum of the recording has.
             Starts::Peaks => 2.0 * (samples / 2.0).ln(),

@@ -49,6 +49,8 @@ pub(crate) enum Starts {
     Waves(&'static [f64]),
     /// Parts of the recording's length.
     Length(&'static [f64]),
+    /// Instants, as parts of the recording's length; the screen looks between them for the sample.
+    Instants(&'static [f64]),
     /// Parts of the range of the argument's integral.
     Travel(&'static [f64]),
     /// Parts of the argument's range in a sample.
@@ -357,7 +359,7 @@ pub(crate) const TERMS: &[Term] = &[
         Equation,
         Time,
         "(if time > {t0} then 1.0 else 0.0)",
-        &[shape("t0", Starts::Length(TIMES), false)],
+        &[shape("t0", Starts::Instants(TIMES), false)],
     ),
     curve(
         "periodic",
@@ -380,7 +382,7 @@ pub(crate) const TERMS: &[Term] = &[
         Parameter,
         Time,
         "(if time > {t0} then 1.0 else 0.0)",
-        &[shape("t0", Starts::Length(TIMES), false)],
+        &[shape("t0", Starts::Instants(TIMES), false)],
     ),
     curve("parameter_ramp", Parameter, Time, "time", &[]),
     Term {

@@ -3,6 +3,7 @@
 //! A term is propagated through the plant linearised along its predictions, whitened as the residual is, and what parameters
 //! and initial states could do is projected off (C. R. Rao's score test, *Proc. Camb. Phil. Soc.* 44, 1948).
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::argument::{Argument, ArgumentForm, arguments};
@@ -10,7 +11,7 @@ use super::curve::{Curve, curves};
 use super::edit::{Place, enters_several, is_of, sensors};
 use super::library::{Needs, Port, Starts, TERMS, Term};
 use super::names::{heats_itself, is_without_units, rank_of};
-use super::path::{hooked, path};
+use super::path::{Hooked, Path, hooked, path};
 use super::projection::{Projection, SIGNATURE};
 use super::values::{Instance, evaluate, grid};
 use crate::explain::locate::spectrum;
@@ -20,6 +21,9 @@ use crate::physics::{ModelSpec, Node, Unknown, VariableId};
 
 /// Numbers of columns that are evaluated in one plant; those with a memory one by one, each in steps of its own.
 const BATCH: usize = 64;
+
+/// Instants tried on either side of the best, each time in an interval so many times shorter.
+const BETWEEN: usize = 8;
 
 /// Terms whose columns differ by less than this angle are one: 1e-4 of the statistic of either tells them apart.
 const SAME: f64 = 0.01;
@@ -167,7 +171,16 @@ pub(crate) fn screen(
             }
         }
     }
-    let outputs = spec.outputs();
+    let tests = Tests {
+        study,
+        fit,
+        recordings,
+        arguments: &arguments,
+        hooked: &hooked,
+        path: &path,
+        projection: &projection,
+        gain: gain.as_ref(),
+    };
     let (remembering, instances): (Vec<_>, Vec<_>) = instances
         .into_iter()
         .partition(|i| !i.term.memories.is_empty());
@@ -175,113 +188,17 @@ pub(crate) fn screen(
         .chunks(BATCH)
         .chain(remembering.chunks(1))
         .collect();
-    let leads: Vec<Lead> = chunks
+    let mut leads: Vec<Lead> = chunks
         .into_par_iter()
-        .flat_map_iter(|chunk| {
-            let values = evaluate(chunk, &arguments, recordings);
-            let mut leads = Vec::new();
-            for (instance, signal) in chunk.iter().zip(values.into_iter().flatten()) {
-                if !signal.iter().flatten().all(|v| v.is_finite()) {
-                    continue;
-                }
-                let argument = instance.argument.map(|a| &arguments[a]);
-                let held = argument.is_some_and(|a| a.held) && instance.term.memories.is_empty();
-                let mut test = |place: Place, sensor: bool, series: &Series| {
-                    let column = fit.noise.whiten_kept(series, study.mask());
-                    if let Some(tested) = projection.test(column, instance.term.free_strength) {
-                        leads.push(Lead {
-                            term: instance.term,
-                            place,
-                            sensor,
-                            argument: instance.argument,
-                            shapes: instance.shapes.clone(),
-                            strength: tested.strength,
-                            statistic: tested.statistic,
-                            curve: None,
-                            signature: tested.signature,
-                        });
-                    }
-                };
-                match instance.term.port {
-                    Port::Sensor => {
-                        for &at in &sensors {
-                            let v = spec.equations[at].unknown.variable();
-                            let Some(o) = outputs.iter().position(|&y| y == v) else {
-                                continue;
-                            };
-                            let shown = spec.expressions.node(spec.equations[at].rest);
-                            let own = argument.is_none_or(|a| {
-                                a.variables == [v]
-                                    || matches!(shown, Node::Variable(x) if a.variables == [x])
-                            });
-                            if !own {
-                                continue;
-                            }
-                            let l = outputs.len();
-                            let series: Series = (0..recordings.len() * l)
-                                .map(|s| {
-                                    if s % l == o {
-                                        signal[s / l].clone()
-                                    } else {
-                                        vec![0.0; signal[s / l].len()]
-                                    }
-                                })
-                                .collect();
-                            test(Place::Equation(at), true, &series);
-                        }
-                    }
-                    port => {
-                        for (place, &column) in hooked.places.iter().zip(&hooked.columns) {
-                            let fits = match (*place, port) {
-                                (Place::Equation(at), Port::Equation)
-                                    if instance.term.needs == Needs::OwnState =>
-                                {
-                                    let own = spec.equations[at].unknown;
-                                    argument
-                                        .is_some_and(|a| own == Unknown::Derivative(a.variables[0]))
-                                }
-                                (Place::Equation(at), Port::Equation) => {
-                                    argument.is_none_or(|a| a.known_after.is_none_or(|k| k < at))
-                                }
-                                (Place::Input(v), Port::Input) => {
-                                    argument.is_some_and(|a| a.variables == [v])
-                                }
-                                // Equations that were found from columns have no variable for a force between bodies.
-                                (Place::Input(v), Port::Equation) => {
-                                    instance.term.needs != Needs::OwnState
-                                        && is_without_units(spec)
-                                        && enters_several(spec, v)
-                                        && argument
-                                            .is_some_and(|a| !a.held && a.known_after.is_none())
-                                }
-                                (Place::Parameter(p), Port::Parameter) => {
-                                    let unit = spec.variable(p).unit_text.as_deref();
-                                    let units = instance.term.units;
-                                    let heats = || {
-                                        argument
-                                            .is_some_and(|a| heats_itself(spec, p, &a.variables))
-                                    };
-                                    (units.is_empty()
-                                        || unit.is_some_and(|u| units.contains(&u))
-                                        || heats())
-                                        && argument.is_none_or(|a| a.known_after.is_none())
-                                }
-                                _ => false,
-                            };
-                            if fits {
-                                let series = path.propagate(column, &signal, held, gain.as_ref());
-                                test(*place, false, &series);
-                            }
-                        }
-                    }
-                }
-            }
-            leads
-        })
+        .flat_map_iter(|chunk| tests.of(chunk))
         .collect();
-    let mut leads = leads;
+    let count = leads.len();
+    let found: Vec<Lead> = TERMS
+        .par_iter()
+        .flat_map_iter(|term| tests.between_instants(term, &leads))
+        .collect();
+    leads.extend(found);
     leads.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
-    let tests = leads.len();
     let leads = distinct(leads, spec, &arguments);
     let whiten = |series: &Series| fit.noise.whiten_kept(series, study.mask());
     let curves = curves(
@@ -296,9 +213,161 @@ pub(crate) fn screen(
     Some(Screen {
         leads,
         curves,
-        tests,
+        tests: count,
         arguments,
     })
+}
+
+/// What score tests need.
+struct Tests<'a> {
+    study: &'a Study<'a>,
+    fit: &'a Fit,
+    recordings: &'a [PlantRecording],
+    arguments: &'a [Argument],
+    hooked: &'a Hooked,
+    path: &'a Path,
+    projection: &'a Projection,
+    gain: Option<&'a DMatrix<f64>>,
+}
+
+impl Tests<'_> {
+    /// Tests terms at every place that takes them.
+    fn of(&self, chunk: &[Instance]) -> Vec<Lead> {
+        let spec = &self.study.plant().spec;
+        let outputs = spec.outputs();
+        let sensors = sensors(spec);
+        let values = evaluate(chunk, self.arguments, self.recordings);
+        let mut leads = Vec::new();
+        for (instance, signal) in chunk.iter().zip(values.into_iter().flatten()) {
+            if !signal.iter().flatten().all(|v| v.is_finite()) {
+                continue;
+            }
+            let argument = instance.argument.map(|a| &self.arguments[a]);
+            let held = argument.is_some_and(|a| a.held) && instance.term.memories.is_empty();
+            let mut test = |place: Place, sensor: bool, series: &Series| {
+                let column = self.fit.noise.whiten_kept(series, self.study.mask());
+                if let Some(tested) = self.projection.test(column, instance.term.free_strength) {
+                    leads.push(Lead {
+                        term: instance.term,
+                        place,
+                        sensor,
+                        argument: instance.argument,
+                        shapes: instance.shapes.clone(),
+                        strength: tested.strength,
+                        statistic: tested.statistic,
+                        curve: None,
+                        signature: tested.signature,
+                    });
+                }
+            };
+            match instance.term.port {
+                Port::Sensor => {
+                    for &at in &sensors {
+                        let v = spec.equations[at].unknown.variable();
+                        let Some(o) = outputs.iter().position(|&y| y == v) else {
+                            continue;
+                        };
+                        let shown = spec.expressions.node(spec.equations[at].rest);
+                        let own = argument.is_none_or(|a| {
+                            a.variables == [v]
+                                || matches!(shown, Node::Variable(x) if a.variables == [x])
+                        });
+                        if !own {
+                            continue;
+                        }
+                        let l = outputs.len();
+                        let series: Series = (0..self.recordings.len() * l)
+                            .map(|s| {
+                                if s % l == o {
+                                    signal[s / l].clone()
+                                } else {
+                                    vec![0.0; signal[s / l].len()]
+                                }
+                            })
+                            .collect();
+                        test(Place::Equation(at), true, &series);
+                    }
+                }
+                port => {
+                    for (place, &column) in self.hooked.places.iter().zip(&self.hooked.columns) {
+                        let fits = match (*place, port) {
+                            (Place::Equation(at), Port::Equation)
+                                if instance.term.needs == Needs::OwnState =>
+                            {
+                                let own = spec.equations[at].unknown;
+                                argument.is_some_and(|a| own == Unknown::Derivative(a.variables[0]))
+                            }
+                            (Place::Equation(at), Port::Equation) => {
+                                argument.is_none_or(|a| a.known_after.is_none_or(|k| k < at))
+                            }
+                            (Place::Input(v), Port::Input) => {
+                                argument.is_some_and(|a| a.variables == [v])
+                            }
+                            // Equations that were found from columns have no variable for a force between bodies.
+                            (Place::Input(v), Port::Equation) => {
+                                instance.term.needs != Needs::OwnState
+                                    && is_without_units(spec)
+                                    && enters_several(spec, v)
+                                    && argument.is_some_and(|a| !a.held && a.known_after.is_none())
+                            }
+                            (Place::Parameter(p), Port::Parameter) => {
+                                let unit = spec.variable(p).unit_text.as_deref();
+                                let units = instance.term.units;
+                                let heats = || {
+                                    argument.is_some_and(|a| heats_itself(spec, p, &a.variables))
+                                };
+                                (units.is_empty()
+                                    || unit.is_some_and(|u| units.contains(&u))
+                                    || heats())
+                                    && argument.is_none_or(|a| a.known_after.is_none())
+                            }
+                            _ => false,
+                        };
+                        if fits {
+                            let series = self.path.propagate(column, &signal, held, self.gain);
+                            test(*place, false, &series);
+                        }
+                    }
+                }
+            }
+        }
+        leads
+    }
+
+    /// A change between the instants that were tested, to the sample: descent cannot find it, because within a sample a change
+    /// has no slope and the statistic has more than one optimum.
+    fn between_instants(&self, term: &'static Term, tested: &[Lead]) -> Vec<Lead> {
+        let of_term = || tested.iter().filter(|l| l.term == term);
+        let strongest = of_term().max_by(|a, b| a.statistic.total_cmp(&b.statistic));
+        let (Some(mut best), [shape]) = (strongest.cloned(), term.shapes) else {
+            return vec![];
+        };
+        let Starts::Instants(parts) = shape.starts else {
+            return vec![];
+        };
+        let mut found = Vec::new();
+        let mut apart = self.study.duration() * (parts[1] - parts[0]);
+        while apart > self.recordings[0].sample_time {
+            apart /= BETWEEN as f64;
+            let finer: Vec<Instance> = (1..BETWEEN)
+                .flat_map(|k| [-1.0, 1.0].map(|sign| sign * k as f64 * apart))
+                .map(|shift| Instance {
+                    term,
+                    argument: best.argument,
+                    shapes: vec![best.shapes[0] + shift],
+                })
+                .collect();
+            let leads = self.of(&finer);
+            let strongest = leads
+                .iter()
+                .max_by(|a, b| a.statistic.total_cmp(&b.statistic));
+            if let Some(lead) = strongest.filter(|l| l.statistic > best.statistic) {
+                best = lead.clone();
+            }
+            found.extend(leads);
+        }
+        found
+    }
 }
 
 /// Frequencies in rad/s at which the whitened residual has most power, the strongest of each output; those of fewer periods than

@@ -35,7 +35,8 @@ fn starts(
         Starts::Travel(parts) => of(parts, &|a, p| p * a.travel(h)),
         Starts::Rate(parts) => of(parts, &|a, p| p * a.range() / h),
         Starts::Waves(counts) => of(counts, &|_, n| n),
-        Starts::Length(parts) => parts
+        Starts::Length(parts) => parts.iter().map(|p| p * samples as f64 * h).collect(),
+        Starts::Instants(parts) => parts
             .iter()
             .map(|p| begin + p * samples as f64 * h)
             .collect(),
