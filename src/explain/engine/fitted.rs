@@ -32,6 +32,8 @@ pub(crate) struct Fitted {
     pub fit: Fit,
     /// Gain in the criterion over the plant without it, less the penalty of the search.
     pub gain: f64,
+    /// Whether blocks left out prove it, whatever the gain.
+    pub proved: bool,
     /// Place in the user's hypotheses; none for a term of the library.
     pub hypothesis: Option<usize>,
 }

@@ -10,6 +10,8 @@ use crate::physics::{Hold, Plant};
 /// Blocks that each recording is cut into; each is left out once. Few and long: over a short run a wrong plant is saved by its
 /// initial state.
 const BLOCKS: usize = 3;
+/// Less of the mean square error in blocks left out is not explained: what is left is then more than what was found.
+pub(crate) const EXPLAINED: f64 = 0.5;
 /// Free runs whose errors are larger than this part of the standard deviation follow nothing: a sensor that shows a constant
 /// comes near 1.
 const FOLLOWS: f64 = 0.95;

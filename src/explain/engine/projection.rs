@@ -1,6 +1,6 @@
 //! The regression of what is left on a term, less what parameters and initial states could do.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -15,6 +15,10 @@ pub(super) const SIGNATURE: usize = 8;
 /// What the regression of the residual on terms needs.
 pub(super) struct Projection {
     q: DMatrix<f64>,
+    /// What a product with `q` says of the numbers of the fit, a row for each.
+    numbers: DMatrix<f64>,
+    inside: Vec<usize>,
+    count: usize,
     pub residual: Vec<f64>,
     noise: Vec<[f64; SIGNATURE]>,
 }
@@ -23,24 +27,31 @@ pub(super) struct Projection {
 pub(super) struct Tested {
     pub statistic: f64,
     pub strength: f64,
+    /// What the regression adds to each number of the fit beside the term.
+    pub shift: Vec<f64>,
     pub signature: [f64; SIGNATURE],
 }
 
 impl Projection {
     pub fn new(study: &Study, fit: &Fit) -> Option<Self> {
         let mut q = study.derivatives(fit)?;
+        let mut norms = Vec::new();
         for mut column in q.column_iter_mut() {
             let norm = column.norm();
             if norm > 0.0 {
                 column /= norm;
             }
+            norms.push(if norm > 0.0 { norm } else { f64::INFINITY });
         }
-        let parts = q.svd(true, false);
-        let u = parts.u?;
+        let parts = q.svd(true, true);
+        let (u, v) = (parts.u?, parts.v_t?);
         let kept: Vec<usize> = (0..u.ncols())
             .filter(|&i| parts.singular_values[i] > 1e-7)
             .collect();
         let q = u.select_columns(&kept);
+        let numbers = DMatrix::from_fn(norms.len(), kept.len(), |i, j| {
+            v[(kept[j], i)] / parts.singular_values[kept[j]] / norms[i]
+        });
         let e = fit.noise.whiten_kept(&study.residual(fit)?, study.mask());
         let mut residual: Vec<f64> = e.iter().map(|&e| fit.noise.weight(e) * e).collect();
         let n = residual.len().max(1) as f64;
@@ -48,6 +59,9 @@ impl Projection {
         residual.iter_mut().for_each(|e| *e /= size.max(1e-300));
         let mut projection = Self {
             q,
+            numbers,
+            inside: study.inside(fit),
+            count: fit.point.len(),
             residual: vec![],
             noise: Vec::new(),
         };
@@ -60,21 +74,24 @@ impl Projection {
         Some(projection)
     }
 
-    pub fn off(&self, column: &mut [f64]) {
-        for q in self.q.column_iter() {
+    /// Projects parameters and initial states off; the products with their directions.
+    pub fn off(&self, column: &mut [f64]) -> DVector<f64> {
+        let products = self.q.column_iter().map(|q| {
             let along: f64 = q.iter().zip(column.iter()).map(|(q, c)| q * c).sum();
             column
                 .iter_mut()
                 .zip(q.iter())
                 .for_each(|(c, q)| *c -= along * q);
-        }
+            along
+        });
+        DVector::from_vec(products.collect())
     }
 
     /// Tests a whitened column; none where parameters can do the same.
     pub fn test(&self, mut column: Vec<f64>, free: bool) -> Option<Tested> {
         let square = |c: &[f64]| c.iter().map(|v| v * v).sum::<f64>();
         let before = square(&column);
-        self.off(&mut column);
+        let products = self.off(&mut column);
         let after = square(&column);
         if !(after > LEAST_LEFT * LEAST_LEFT * before && after.is_finite()) {
             return None;
@@ -94,9 +111,15 @@ impl Projection {
         } else {
             (along.max(0.0).powi(2) / after, 1.0)
         };
+        let of_inside = &self.numbers * products * -strength;
+        let mut shift = vec![0.0; self.count];
+        for (&i, s) in self.inside.iter().zip(&of_inside) {
+            shift[i] = *s;
+        }
         Some(Tested {
             statistic,
             strength,
+            shift,
             signature,
         })
     }

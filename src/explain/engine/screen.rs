@@ -45,6 +45,8 @@ pub(crate) struct Lead {
     pub shapes: Vec<f64>,
     /// Strength that the regression gives.
     pub strength: f64,
+    /// What the regression adds to the numbers of the fit beside it; empty where that is not known.
+    pub shift: Vec<f64>,
     /// Decrease of the deviance that it foretells.
     pub statistic: f64,
     /// What stands for the form of a curve.
@@ -63,6 +65,7 @@ impl Lead {
             argument: None,
             shapes: vec![],
             strength: 0.0,
+            shift: vec![],
             statistic: 0.0,
             curve: None,
             signature: [0.0; SIGNATURE],
@@ -108,6 +111,7 @@ pub(crate) struct Screen {
 pub(crate) fn screen(
     study: &Study,
     fit: &Fit,
+    along: &Fit,
     given: &ModelSpec,
     recordings: &[PlantRecording],
 ) -> Option<Screen> {
@@ -115,7 +119,7 @@ pub(crate) fn screen(
     let mut arguments = arguments(spec);
     arguments.retain(|a| a.variables.iter().all(|&v| is_of(spec, v, given)));
     let hooked = hooked(spec, given, &arguments)?;
-    let path = path(study, fit, &hooked, recordings, &mut arguments)?;
+    let path = path(study, along, &hooked, recordings, &mut arguments)?;
     let projection = Projection::new(study, fit)?;
     let gain = study.gain(fit);
     let sensors = sensors(spec);
@@ -254,6 +258,7 @@ impl Tests<'_> {
                         argument: instance.argument,
                         shapes: instance.shapes.clone(),
                         strength: tested.strength,
+                        shift: tested.shift,
                         statistic: tested.statistic,
                         curve: None,
                         signature: tested.signature,

@@ -7,12 +7,14 @@ use super::candidate::{Candidate, candidate};
 use super::eliminate::alone;
 use super::finish::finished;
 use super::fitted::{Fitted, TIE, order, searched, with_more};
-use super::holdout::HeldOut;
+use super::holdout::{EXPLAINED, Estimator, HeldOut, held_out};
 use super::hypothesis::{Ground, Trial, trials};
+use super::library::Needs;
 use super::names::{SPECIFIC, named, rank_of};
 use super::scope::Scope;
 use super::screen::{Lead, Screen, screen};
 use super::second_effect::{determined, differs, drop_alike};
+use super::select::EQUAL;
 use crate::physics::estimate::{
     Effort, EstimateError, EstimateOptions, Fit, Form, PlantRecording, Study,
 };
@@ -213,6 +215,27 @@ fn improved(stage: &Stage, fitted: &[Fitted]) -> Option<Fit> {
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
 }
 
+/// Where the fit of a candidate starts: with the other numbers as they were, or as the regression on its term moves them.
+fn started(inner: &Study, made: &Candidate, lead: &Lead, (study, from): (&Study, &Fit)) -> Fit {
+    let states = study.plant().spec.states().len();
+    let (parameters, outputs) = (study.parameters(), study.outputs());
+    let plain = made.from(from, parameters, states, outputs);
+    if lead.shift.is_empty() {
+        return plain;
+    }
+    let moved = Fit {
+        point: study.moved(from, &lead.shift),
+        ..from.clone()
+    };
+    let moved = made.from(&moved, parameters, states, outputs);
+    let deviance = |fit: &Fit| inner.deviance(fit).unwrap_or(f64::INFINITY);
+    if deviance(&moved) < deviance(&plain) {
+        moved
+    } else {
+        plain
+    }
+}
+
 /// Fits the leads of a plant; best first. Also the strongest test, and how many there were.
 fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
     let Stage {
@@ -232,7 +255,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
     let parameters = study.parameters();
     let outputs = study.outputs();
     let mut tried: Vec<(Screen, Fit)> = Vec::new();
-    if let Some(s) = screen(study, fit, given, recordings) {
+    if let Some(s) = screen(study, fit, fit, given, recordings) {
         tried.push((s, fit.clone()));
     }
     let strongest = tried.first().map_or((0.0, 0), |(s, _)| {
@@ -248,12 +271,28 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
             screen.curves.clear();
         }
     }
+    // Where the free run strays from the recording, what a term would do depends on where the recording was. That an observer
+    // follows the noise too is of no matter for where fits start, but would be for the test above.
+    if !nothing_left && options.least_squares {
+        let along = study.along_recording(fit);
+        if along.form != fit.form
+            && let Some(s) = screen(study, fit, &along, given, recordings)
+        {
+            tried = vec![(s, fit.clone())];
+        }
+    }
     // A noise model that was fitted where physics is missing absorbs it: the same again under white noise.
     if !nothing_left
         && !options.least_squares
         && let Some(white) = study.least_squares(&fit.point)
         && study.follows(&white)
-        && let Some(s) = screen(study, &white, given, recordings)
+        && let Some(s) = screen(
+            study,
+            &white,
+            &study.along_recording(&white),
+            given,
+            recordings,
+        )
     {
         tried.push((s, white));
     }
@@ -263,7 +302,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
         && fit.form == Form::Innovation
         && fit.noise.degrees.is_finite()
         && let Some(gaussian) = study.gaussian(fit)
-        && let Some(s) = screen(study, &gaussian, given, recordings)
+        && let Some(s) = screen(study, &gaussian, &gaussian, given, recordings)
         && chance(s.leads.first().map_or(0.0, |l| l.statistic)) * s.tests as f64 <= LEFT
     {
         tried.push((s, gaussian));
@@ -303,7 +342,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
                 .with_accuracy(GLANCED_ACCURACY)
                 .with_most_steps(GLANCED_STEPS);
             let inner = study.of(&rough, &options).ok()?;
-            let start = made.from(from, parameters, states, outputs);
+            let start = started(&inner, &made, &lead, (study, from));
             // What a memory does within a sample, such as a contact, frozen slopes do not see.
             let fitted = match made.new_states {
                 0 => inner.glance(&start, GLANCE)?,
@@ -378,6 +417,7 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
                 fit: best,
                 gain,
                 hypothesis: None,
+                proved: false,
             })
         })
         .collect();
@@ -399,6 +439,46 @@ fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     order(&plant.spec, &mut fitted);
     (fitted, strongest)
+}
+
+/// What blocks left out say of free runs, where values that depend on each other make a criterion weak: a candidate that takes
+/// more than half of the mean square off them is proved, and of these, and of those whose criteria are equal, the one that
+/// follows best is first. What depends on time alone is not proved so: its value in a block is a level that any slow error has.
+fn judge_by_blocks(
+    fitted: &mut [Fitted],
+    (plant, fit): (&Plant, &Fit),
+    recordings: &[PlantRecording],
+    hold: Hold,
+) {
+    let errors_of =
+        |plant: &Plant, fit: &Fit| held_out(plant, fit, Estimator::FreeRun, recordings, hold);
+    let Some(without) = errors_of(plant, fit) else {
+        return;
+    };
+    let best = fitted.first().map_or(0.0, |f| f.gain);
+    let mut judged: Vec<(usize, HeldOut)> = (0..fitted.len().min(FINISHED))
+        .into_par_iter()
+        .filter_map(|i| Some((i, errors_of(&fitted[i].candidate.plant, &fitted[i].fit)?)))
+        .collect();
+    judged.retain(|(i, errors)| {
+        let f = &fitted[*i];
+        let proved = errors.removed(&without) >= EXPLAINED && f.lead.term.needs != Needs::Time;
+        proved || f.gain > NEEDED.max(best - NEEDED)
+    });
+    judged.sort_by(|a, b| a.1.over(&b.1).total_cmp(&1.0));
+    let Some((first, least)) = judged.first() else {
+        return;
+    };
+    let id = |i: usize| named(&plant.spec, &fitted[i]);
+    let rival = judged[1..]
+        .iter()
+        .any(|(i, errors)| errors.over(least) <= 1.0 + EQUAL && id(*i) != id(*first));
+    if rival {
+        return;
+    }
+    let first = *first;
+    fitted[first].proved = least.removed(&without) >= EXPLAINED;
+    fitted[..=first].rotate_right(1);
 }
 
 /// The second of two effects alone where the first is of no use beside it: both together gain less over it than a second
@@ -470,10 +550,12 @@ pub(crate) fn search(
             .collect();
         let needed = match steps.first().and_then(|s| s.first()) {
             None => NEEDED,
+            // Where blocks left out, not the criterion, prove the first, no second is looked for.
+            Some(first) if first.gain <= NEEDED => f64::INFINITY,
             Some(first) => SECOND.0.max(SECOND.1 * first.gain),
         };
         let mut attempts = 0;
-        let (fitted, strongest) = loop {
+        let (mut fitted, strongest) = loop {
             let stage = Stage {
                 plant: &now,
                 study: &study,
@@ -510,6 +592,9 @@ pub(crate) fn search(
                 break (fitted, strongest);
             }
         };
+        if least_squares {
+            judge_by_blocks(&mut fitted, (&now, &fit), recordings, hold);
+        }
         for &i in &open {
             let trial = fitted.iter().find(|f| f.hypothesis == Some(i));
             match count {
@@ -529,7 +614,9 @@ pub(crate) fn search(
             })
         };
         let best = fitted.first().filter(new);
-        let accepted = best.filter(|f| f.gain > needed && count < MOST).cloned();
+        let accepted = best
+            .filter(|f| (f.gain > needed || f.proved) && count < MOST)
+            .cloned();
         let Some(best) = accepted else {
             if steps.is_empty() {
                 steps.push(fitted);

@@ -15,7 +15,7 @@ use crate::physics::{Hold, Plant};
 
 /// Free runs whose errors differ by less than this part are equally good (the tolerance of the project's score
 /// on real recordings).
-const EQUAL: f64 = 0.02;
+pub(super) const EQUAL: f64 = 0.02;
 /// Level of the test that asks whether maximum likelihood and least squares differ by more than chance allows.
 const MISSPECIFIED: f64 = 0.05;
 /// Probability by chance below which the strongest score test says that something is left.
@@ -46,7 +46,7 @@ pub(crate) fn select(
     scope: &Scope,
 ) -> Result<Found, EstimateError> {
     let likely = search(plant, recordings, hold, scope, Objective::Likelihood, None)?;
-    let mut rivals = rivals(&likely, 0, 0, recordings, hold);
+    let mut rivals = rivals(&likely, 0, recordings, hold);
     let Some(without) = best(&rivals, |r| r.accepted == 0) else {
         return Ok(likely);
     };
@@ -72,16 +72,19 @@ pub(crate) fn select(
             .map(|r| r.fit.clone());
         let free_run = Objective::FreeRun;
         if let Ok(found) = search(plant, recordings, hold, scope, free_run, known.as_ref()) {
-            rivals.extend(self::rivals(&found, 1, 1, recordings, hold));
+            rivals.extend(self::rivals(&found, 1, recordings, hold));
             searches.push(found);
         }
         let improving: Vec<&Rival> = rivals
             .iter()
             .filter(|r| !worsens(&rivals, r.search, r.accepted))
             .collect();
-        if let Some(winner) = winner(&improving) {
-            chosen = winner;
-        }
+        chosen = match winner(&improving) {
+            // Without an effect the tests of the likelihood count.
+            Some((_, 0)) => (0, 0),
+            Some(winner) => winner,
+            None => chosen,
+        };
     }
     let (which, accepted) = chosen;
     let fitted = |accepted: usize| {
@@ -172,16 +175,10 @@ fn winner(rivals: &[&Rival]) -> Option<(usize, usize)> {
     Some((chosen.search, chosen.accepted))
 }
 
-/// Every number of effects of a search from `fewest`, by both estimators, and the plant as it was given.
-fn rivals(
-    found: &Found,
-    search: usize,
-    fewest: usize,
-    recordings: &[PlantRecording],
-    hold: Hold,
-) -> Vec<Rival> {
+/// Every number of effects of a search, by both estimators, and once the plant as it was given.
+fn rivals(found: &Found, search: usize, recordings: &[PlantRecording], hold: Hold) -> Vec<Rival> {
     let mut all = Vec::new();
-    for accepted in fewest..=found.accepted {
+    for accepted in 0..=found.accepted {
         let (plant, fit) = found.stage(accepted);
         let of_search = match found.options.least_squares {
             true => Estimator::FreeRun,
@@ -195,7 +192,7 @@ fn rivals(
             fits[0].2 = misspecified;
             fits.push((Estimator::FreeRun, least_squares, false));
         }
-        if accepted == 0
+        if (search, accepted) == (0, 0)
             && let Some(given) = as_given(plant, recordings, hold)
         {
             fits.push((Estimator::Given, given, false));

@@ -10,7 +10,7 @@ pub use simulate::{AugmentedPlantError, Original};
 
 use super::answer::extremes;
 use super::engine::fitted::Fitted;
-use super::engine::holdout::{HeldOut, blocks};
+use super::engine::holdout::{EXPLAINED, HeldOut, blocks};
 use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
 use super::engine::library::Port;
 use super::engine::scope::Scope;
@@ -30,9 +30,6 @@ use crate::physics::{Excitation, Hold, ModelSpec, Plant, Span};
 
 /// A parameter is said to differ from the text where it does by so many standard deviations.
 const DIFFERENT: f64 = 3.3;
-/// Where structure is left, a name is given only to what takes this part off the mean square of the error in blocks left out:
-/// more is explained than is not.
-const MOST: f64 = 0.5;
 /// Points of a picture.
 const TRACE_POINTS: usize = 1500;
 
@@ -165,15 +162,17 @@ impl Answer<'_> {
         let p_value = (tests as f64 * chance(statistic)).min(1.0);
         let adequate = p_value >= CHANCE;
         let explains = self.found.held_out.as_ref();
-        let explains = explains.is_none_or(|[without, with]| with.removed(without) >= MOST);
+        let explains = explains.is_none_or(|[without, with]| with.removed(without) >= EXPLAINED);
         let effects: Vec<EffectFound> = self
             .effects()
             .enumerate()
             .filter_map(|(i, fitted)| self.effect(i, fitted))
             .collect();
-        // A curve that leaves structure may follow what enters elsewhere; a term with a name of its own claims more.
+        // Where structure is left, a name is given only to what explains more of blocks left out than it leaves. A
+        // curve that leaves structure may follow what enters elsewhere; a term with a name of its own claims more.
         let curves = effects.iter().any(|e| e.effect == "law");
-        let sure = gain >= SURE && (adequate || explains && !curves);
+        let sure =
+            (gain >= SURE || best.is_some_and(|b| b.proved)) && (adequate || explains && !curves);
         let verdict = if self.found.accepted > 0 && sure {
             Verdict::Named
         } else if self.found.accepted > 0 || p_value < CHANCE {

@@ -33,35 +33,41 @@ pub(super) fn fit(problem: &Problem, from: Option<&[f64]>) -> Option<Fit> {
         return None;
     }
     let nominal = from.map_or_else(|| problem.nominal(), <[f64]>::to_vec);
-    let mut starts: Vec<(f64, Vec<f64>)> = Vec::new();
-    for gain in gains(problem) {
-        let mut point = nominal.clone();
-        point.extend(
-            (0..n)
-                .flat_map(|i| (0..l).map(move |j| (i, j)))
-                .map(|at| gain[at]),
-        );
-        let mut objective = Deviance::new(problem, Form::Innovation, Noise::unit(l));
-        let Some(noise) = objective.rescale(&point) else {
-            continue;
-        };
-        objective.noise = noise;
-        let Some(residual) = objective.residual(&point) else {
-            continue;
-        };
-        starts.push((objective.noise.deviance(&residual, &problem.mask), point));
-    }
-    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut ranges = problem.ranges();
     ranges.extend(unbounded(n * l));
+    let mut starts = starts(problem, &nominal);
     starts.truncate(SEARCHED);
     let found: Vec<Fit> = starts
         .into_par_iter()
-        .filter_map(|(_, point)| from_start(problem, point, &ranges))
+        .filter_map(|start| from_start(problem, start.point, &ranges))
         .collect();
     found
         .into_iter()
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+}
+
+/// Parameters and initial states with the gains that no search has improved yet, best first.
+pub(super) fn starts(problem: &Problem, numbers: &[f64]) -> Vec<Fit> {
+    let (n, l) = (problem.states(), problem.outputs());
+    let start = |gain: DMatrix<f64>| {
+        let mut point = numbers.to_vec();
+        let elements = (0..n).flat_map(|i| (0..l).map(move |j| (i, j)));
+        point.extend(elements.map(|at| gain[at]));
+        let mut objective = Deviance::new(problem, Form::Innovation, Noise::unit(l));
+        objective.noise = objective.rescale(&point)?;
+        let residual = objective.residual(&point)?;
+        let deviance = objective.noise.deviance(&residual, &problem.mask);
+        Some(Fit {
+            form: Form::Innovation,
+            criterion: problem.criterion(deviance, objective.noise.len(), n * l),
+            noise: objective.noise,
+            point,
+            deviance,
+        })
+    };
+    let mut found: Vec<Fit> = gains(problem).into_iter().filter_map(start).collect();
+    found.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
+    found
 }
 
 /// The fit from a start: under white Gaussian noise first, then with the tails that are found.

@@ -4,12 +4,15 @@ use nalgebra::DMatrix;
 
 use super::deviance::{Deviance, Slopes};
 use super::free_run::{follows, white_fit};
-use super::observer::unbounded;
+use super::observer::{self, unbounded};
 use super::optimise::{Effort, minimise};
 use super::problem::{EstimateError, PlantRecording, Problem};
 use super::{EstimateOptions, Fit, Form, SEARCH, best_fit};
 use crate::noise::{Colours, Mask, Noise, Series, effective_samples};
 use crate::physics::simulation::{Observer, Plant, Point, Trajectory};
+
+/// A free run whose error is more than twice that of an observer strays: the logarithm of the ratio of their variances.
+const STRAYS: f64 = 1.386;
 
 /// A problem of estimation that is looked at from several sides.
 pub(crate) struct Study<'a> {
@@ -105,6 +108,25 @@ impl<'a> Study<'a> {
         Some(Fit { criterion, ..fit })
     }
 
+    /// A fit with the same parameters whose states are nearer to those of the plant: where a free run strays from the recording,
+    /// an observer that keeps the states near what the outputs show.
+    pub fn along_recording(&self, fit: &Fit) -> Fit {
+        let numbers = self.problem.nominal().len();
+        let white = self.gaussian(fit).filter(|w| w.form == Form::FreeRun);
+        let observed = white.as_ref().and_then(|_| {
+            let starts = observer::starts(&self.problem, &fit.point[..numbers]);
+            starts.into_iter().next()
+        });
+        match (white, observed) {
+            (Some(white), Some(observed))
+                if white.deviance - observed.deviance > STRAYS * self.count() as f64 =>
+            {
+                observed
+            }
+            _ => fit.clone(),
+        }
+    }
+
     /// The same numbers under Gaussian noise of the size of the residual, where every value counts as much as any other.
     pub fn gaussian(&self, fit: &Fit) -> Option<Fit> {
         let residual = self.residual(fit)?;
@@ -198,18 +220,38 @@ impl<'a> Study<'a> {
         Deviance::new(&self.problem, fit.form, fit.noise.clone()).residual(&fit.point)
     }
 
+    /// Deviance with the noise of the fit.
+    pub fn deviance(&self, fit: &Fit) -> Option<f64> {
+        Some(fit.noise.deviance(&self.residual(fit)?, self.mask()))
+    }
+
     /// Whitened derivatives of the predictions by the free numbers that are not at a bound.
     pub fn derivatives(&self, fit: &Fit) -> Option<DMatrix<f64>> {
         let all =
             Deviance::new(&self.problem, fit.form, fit.noise.clone()).derivatives(&fit.point)?;
+        Some(all.select_columns(&self.inside(fit)))
+    }
+
+    /// The free numbers that are not at a bound, by their places.
+    pub fn inside(&self, fit: &Fit) -> Vec<usize> {
         let ranges = self.problem.ranges();
         let inside = |i: &usize| {
             ranges
                 .get(*i)
                 .is_none_or(|r| fit.point[*i] > r.min && fit.point[*i] < r.max)
         };
-        let kept: Vec<usize> = (0..all.ncols()).filter(inside).collect();
-        Some(all.select_columns(&kept))
+        (0..fit.point.len()).filter(inside).collect()
+    }
+
+    /// The numbers moved, within their bounds.
+    pub fn moved(&self, fit: &Fit, shift: &[f64]) -> Vec<f64> {
+        let ranges = self.problem.ranges();
+        let each = fit.point.iter().zip(shift).enumerate();
+        let moved = each.map(|(i, (x, s))| match ranges.get(i) {
+            Some(range) => (x + s).clamp(range.min.min(*x), range.max.max(*x)),
+            None => x + s,
+        });
+        moved.collect()
     }
 
     /// Covariance of the free numbers.
