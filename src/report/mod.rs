@@ -28,12 +28,13 @@ mod json_schema;
 mod model;
 mod overview;
 mod page;
-mod plant;
+pub(crate) mod plant;
 mod read_explanation;
 mod reproduction_csv;
-pub mod text;
+pub(crate) mod text;
 mod validation_document;
 
+pub use crate::linalg::Rows;
 pub use document_error::DocumentError;
 pub use json_layout::to_json;
 pub use json_schema::schema;
@@ -46,13 +47,14 @@ pub use page::PageError;
 pub use page::explanation::explanation_page;
 pub use page::identification::identification_page;
 pub use page::plant::plant_page;
-pub use page::reproduction::reproduction_page;
+pub(crate) use page::reproduction::reproduction_page;
 pub use plant::{
     FitDocument, IdentifiedDocument, InitialStateDocument, InnovationSizeDocument, JudgeError,
-    LINEARISATION_FORMAT, LinearisationDocument, OperatingValue, PLANT_FORMAT, PlantDocument,
-    PlantValidation, SimulatorDocument, TestDocument, Uncertain, frequency_grid, is_plant,
-    judge_plant, logarithmic, plant_fits, text_alone,
+    LINEARISATION_FORMAT, LinearisationDocument, NoiseDocument, OperatingValue, PLANT_FORMAT,
+    ParameterDocument, PlantDocument, PlantValidation, SimulatorDocument,
+    SimulatorParameterDocument, TestDocument, Uncertain, judge_plant,
 };
+pub(crate) use plant::{frequency_grid, is_plant, logarithmic, plant_fits, text_alone};
 pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
-pub use reproduction_csv::reproduction_csv;
+pub(crate) use reproduction_csv::reproduction_csv;
 pub use validation_document::{PLANT_VALIDATION_FORMAT, VALIDATION_FORMAT, ValidationDocument};

@@ -15,19 +15,19 @@ pub(super) const SIGNATURE: usize = 8;
 /// What the regression of the residual on terms needs.
 pub(super) struct Projection {
     q: DMatrix<f64>,
-    pub residual: Vec<f64>,
+    pub(super) residual: Vec<f64>,
     noise: Vec<[f64; SIGNATURE]>,
 }
 
 /// What a test says.
 pub(super) struct Tested {
-    pub statistic: f64,
-    pub strength: f64,
-    pub signature: [f64; SIGNATURE],
+    pub(super) statistic: f64,
+    pub(super) strength: f64,
+    pub(super) signature: [f64; SIGNATURE],
 }
 
 impl Projection {
-    pub fn new(study: &Study, fit: &Fit) -> Option<Self> {
+    pub(crate) fn new(study: &Study, fit: &Fit) -> Option<Self> {
         let mut q = study.derivatives(fit)?;
         for mut column in q.column_iter_mut() {
             let norm = column.norm();
@@ -60,7 +60,7 @@ impl Projection {
         Some(projection)
     }
 
-    pub fn off(&self, column: &mut [f64]) {
+    pub(crate) fn off(&self, column: &mut [f64]) {
         for q in self.q.column_iter() {
             let along: f64 = q.iter().zip(column.iter()).map(|(q, c)| q * c).sum();
             column
@@ -71,7 +71,7 @@ impl Projection {
     }
 
     /// Tests a whitened column; none where parameters can do the same.
-    pub fn test(&self, mut column: Vec<f64>, free: bool) -> Option<Tested> {
+    pub(crate) fn test(&self, mut column: Vec<f64>, free: bool) -> Option<Tested> {
         let square = |c: &[f64]| c.iter().map(|v| v * v).sum::<f64>();
         let before = square(&column);
         self.off(&mut column);

@@ -119,7 +119,7 @@ impl<'a> MemoryRecords<'a> {
 ///
 /// # Errors
 /// What is wrong with a file, or what `work` says.
-pub fn on_files<T>(
+pub(crate) fn on_files<T>(
     sources: &[Source],
     roles: &Roles,
     progress: Option<ReadProgress<'_>>,

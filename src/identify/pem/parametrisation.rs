@@ -9,7 +9,7 @@ use crate::model::{Armax, StateSpace};
 
 /// Form of the model that is searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Form {
+pub(crate) enum Form {
     /// Innovation form with all entries free but those that only change the state basis: data-driven local
     /// coordinates (McKelvey, Helmersson & Ribarits 2004). Any number of inputs and outputs.
     Innovation,

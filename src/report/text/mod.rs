@@ -8,24 +8,26 @@ mod plant;
 mod reproduction_text;
 mod table;
 
-pub use effects_text::{UnknownId, effects_text};
+pub(crate) use effects_text::effects_text;
 pub use explanation_text::explanation_text;
-pub use model::{ModelText, comparison, model_text, show_text, validation_text, verdict};
+pub(crate) use model::comparison;
+pub use model::{ModelText, model_text, show_text, validation_text, verdict};
 pub(crate) use model::{
     doubtful, findings, fit_table, gain_table, linearity_tested, method, order_table, pole_table,
     test_tables, too_short,
 };
 pub(crate) use number::percent;
+pub(crate) use plant::linearisation_text;
 pub(crate) use plant::{
     initial_state_table, leaves_something_out, parameter_table, residual_test_table,
     verdict as plant_verdict,
 };
-pub use plant::{linearisation_text, plant_estimate_text, plant_text, plant_validation_text};
-pub use reproduction_text::reproduction_text;
+pub use plant::{plant_estimate_text, plant_text, plant_validation_text};
+pub(crate) use reproduction_text::reproduction_text;
 pub(crate) use table::Table;
 
 /// Widest line.
-pub const WIDTH: usize = 100;
+pub(crate) const WIDTH: usize = 100;
 
 /// How text is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

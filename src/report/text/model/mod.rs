@@ -11,7 +11,7 @@ mod verdict_text;
 pub(crate) use fit_text::{fit_measures, fit_table};
 pub(crate) use model_text::method;
 pub use model_text::{ModelText, model_text};
-pub use orders::comparison;
+pub(crate) use orders::comparison;
 pub(crate) use orders::order_table;
 pub(crate) use roots::{continuous_pole_table, gain_table, pole_table, shortened};
 pub(crate) use show_text::responses;

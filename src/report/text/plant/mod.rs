@@ -4,7 +4,7 @@ mod linearisation_text;
 mod plant_text;
 mod plant_validation_text;
 
-pub use linearisation_text::linearisation_text;
+pub(crate) use linearisation_text::linearisation_text;
 pub(crate) use plant_text::{leaves_something_out, parameter_table, verdict};
 pub use plant_text::{plant_estimate_text, plant_text};
 pub use plant_validation_text::plant_validation_text;
