@@ -1,6 +1,7 @@
 //! What the command, the wheel, tests and benchmarks of this repository use beside the API. No stability: it changes and
 //! goes without notice.
 
+#[cfg(feature = "cli")]
 pub mod cli {
     pub use crate::cli::run;
 }

@@ -67,6 +67,11 @@
 //! The equations, from the recording to the covariance and to what a simulation leaves out, are one chapter:
 //! [`mathematics`].
 //!
+//! # Features
+//!
+//! `cli`, on by default, is the command `innovant`; `report`, on by default and part of `cli`, writes HTML pages. A program that
+//! identifies, explains and reads or writes JSON documents needs neither (`default-features = false`).
+//!
 //! # References
 //! - J.W. van Wingerden, *The asymptotic variance of the PBSIDopt algorithm* (equation numbers in this
 //!   documentation are that paper's; its printed sign of the terms beta in Appendix B is wrong, see
@@ -77,7 +82,9 @@
 // `pub` means API: `docs/public_api.txt` lists it. Anything else is `pub(crate)` or narrower.
 #![warn(unreachable_pub)]
 
+#[cfg(feature = "cli")]
 mod batch;
+#[cfg(feature = "cli")]
 mod cli;
 pub mod covariance;
 pub mod explain;
@@ -93,6 +100,7 @@ mod moments;
 mod noise;
 pub mod physics;
 pub mod report;
+#[cfg(feature = "cli")]
 mod reproduce;
 mod systems;
 pub mod validate;
@@ -113,8 +121,8 @@ pub mod validate;
 )]
 pub mod mathematics {}
 
-// Errors that those of several modules carry.
-pub use limits::LimitError;
+// Errors that those of several modules carry, and the limit that one of them is about.
+pub use limits::{LimitError, set_memory_limit};
 pub use linalg::LinalgError;
 
 pub use identify::{IdentifyError, Model, Options, identify};

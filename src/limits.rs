@@ -90,7 +90,7 @@ pub enum LimitError {
 }
 
 /// Sets the limit of this process in bytes; `None` takes it back to the environment's or the machine's.
-pub(crate) fn set_memory_limit(bytes: Option<u64>) {
+pub fn set_memory_limit(bytes: Option<u64>) {
     ASKED.store(bytes.unwrap_or(0), Ordering::Relaxed);
 }
 

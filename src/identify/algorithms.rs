@@ -14,17 +14,9 @@ const SMALLEST_PAST_OF_KNUDSEN: usize = 20;
 
 /// Algorithm that estimates the system matrices.
 #[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Default,
-    Serialize,
-    Deserialize,
-    schemars::JsonSchema,
-    clap::ValueEnum,
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
 )]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// Predictor-based subspace identification, optimised (van Wingerden); the first step of the
@@ -46,7 +38,14 @@ pub enum Method {
 impl Method {
     /// Every method there is.
     pub fn all() -> &'static [Self] {
-        clap::ValueEnum::value_variants()
+        &[
+            Self::PbsidOpt,
+            Self::Knudsen,
+            Self::Pem,
+            Self::Subid,
+            Self::Whitening,
+            Self::InnovationEstimation,
+        ]
     }
 
     /// The name on the command line and in documents.
@@ -181,9 +180,8 @@ impl Method {
 }
 
 /// Step that estimates `K` and `Lambda` in the place of the method's own.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema, clap::ValueEnum,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Stochastic {
     /// The gain whose one-step predictor is nearest to the vector ARX model, given A, B, C, D: maximum
@@ -198,7 +196,7 @@ pub enum Stochastic {
 impl Stochastic {
     /// Every step there is.
     pub fn all() -> &'static [Self] {
-        clap::ValueEnum::value_variants()
+        &[Self::Innovations, Self::FirstColumn, Self::Cholesky]
     }
 
     /// The name on the command line and in documents.

@@ -47,7 +47,9 @@ pub(crate) mod variance;
 
 pub use crate::moments::{Detrend, Route};
 pub use algorithms::{Method, Stochastic};
-pub(crate) use data::{AlignedColumns, on_files};
+pub(crate) use data::AlignedColumns;
+#[cfg(feature = "cli")]
+pub(crate) use data::on_files;
 pub use data::{
     FileRecords, MemoryRecords, ReadProgress, Recording, Records, ReducedRecords, SAMPLES_KEPT,
 };
@@ -56,6 +58,7 @@ pub use identified_model::{IdentifiedChannel, Model, identify, identify_records}
 pub use identify_error::IdentifyError;
 pub use options::{CovarianceKind, Options, Order, Polish};
 pub use order::{FreeRunRest, OrderEvidence};
+#[cfg(feature = "cli")]
 pub(crate) use polish::{Effort, polish, predictor_coefficients};
 #[cfg(test)]
 pub(crate) use result::Fit;
@@ -63,5 +66,6 @@ pub(crate) use result::of_closed_loop as warnings_of_closed_loop;
 pub use result::{
     Asked, CoarseChannel, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
 };
+#[cfg(feature = "cli")]
 pub(crate) use subspace::{Decomposition, Estimate, Varx, decompose, system_matrices, varx};
 pub use subspace::{Prediction, Weight};

@@ -435,7 +435,7 @@ impl LogError {
     }
 
     /// Whether the reader of our standard output has gone (`innovant ... | head`): success for a command line.
-    pub(crate) fn is_broken_pipe(&self) -> bool {
+    pub fn is_broken_pipe(&self) -> bool {
         matches!(self, Self::Write { source, .. } if source.kind() == io::ErrorKind::BrokenPipe)
     }
 

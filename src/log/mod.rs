@@ -62,6 +62,8 @@ pub use record::Log;
 pub use roles::{Missing, RoleNeed, Roles, TimeUnit};
 pub(crate) use sample_time::is_sample_time;
 pub use text::{Channel, Source};
+#[cfg(feature = "cli")]
 pub(crate) use time::Origin;
+#[cfg(feature = "cli")]
 pub(crate) use write::write_file_atomically;
 pub use write::{CsvWriter, write_table};

@@ -61,6 +61,7 @@ mod verdict;
 #[cfg(test)]
 mod tests;
 
+#[cfg(feature = "cli")]
 pub(crate) use deviations::{Deviations, Zero, judge};
 pub use identified::{TestedModel, identify_and_test};
 pub(crate) use length::too_short;

@@ -23,6 +23,7 @@ pub(crate) use factor_source::deviations;
 pub(crate) use lags::{lags_needed, longest_past};
 pub(crate) use memory_need::Sizes;
 pub(crate) use recording_moments::Data;
+#[cfg(feature = "cli")]
 pub(crate) use records::on_files;
 pub use records::{FileRecords, MemoryRecords, ReadProgress, Recording, Records};
 pub use reduced_records::{ReducedRecords, SAMPLES_KEPT};

@@ -26,7 +26,7 @@ use crate::linalg::{
     LinalgError, all_finite, cholesky_upper, multiply_nt, multiply_tn, qr_r,
     solve_upper_transposed, svd_thin,
 };
-use crate::model::{Armax, ModelError, StateSpace};
+use crate::model::{ModelError, StateSpace};
 
 pub(crate) use parametrisation::Form;
 pub(crate) use sensitivity::Signals;
@@ -62,8 +62,9 @@ pub(crate) struct PredictionErrorEstimate {
     pub(crate) innovation_covariance: DMatrix<f64>,
     /// Inverse information, in the basis of the system.
     pub(crate) covariance: ParameterCovariance,
+    #[cfg(feature = "cli")]
     /// The polynomials with the covariance of `a1..an, (b0), b1..bn, c1..cn`, when that was the form.
-    pub(crate) armax: Option<(Armax, DMatrix<f64>)>,
+    pub(crate) armax: Option<(crate::model::Armax, DMatrix<f64>)>,
     /// `N log det` of the mean square prediction errors.
     pub(crate) cost: f64,
     /// Whether no step promised anything any more.
@@ -146,6 +147,7 @@ pub(crate) fn prediction_error_method(
     let coordinates = linearised.covariance() * inflation;
     let matrix = multiply_nt(&(&directions * &coordinates), &directions);
     Ok(PredictionErrorEstimate {
+        #[cfg(feature = "cli")]
         armax: (form == Form::Armax).then(|| {
             (
                 parametrisation::armax_of_observer_form(&point.system),

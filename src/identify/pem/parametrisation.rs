@@ -108,6 +108,7 @@ fn polynomials(system: &StateSpace) -> Polynomials {
     out
 }
 
+#[cfg(feature = "cli")]
 /// The polynomials of a system that is in observer form.
 pub(super) fn armax_of_observer_form(system: &StateSpace) -> Armax {
     let Polynomials { a, b, c } = polynomials(system);

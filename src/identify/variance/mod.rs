@@ -24,6 +24,7 @@ pub use asymptotic::{AsymptoticMethod, asymptotic_covariance};
 pub(crate) use nested_errors::NestedErrors;
 pub(super) use nested_errors::newest_first;
 pub(crate) use propagation::Propagation;
+#[cfg(feature = "cli")]
 pub(crate) use subspace::jacobian_with_sign;
 pub(crate) use subspace::subspace_propagation;
 pub use subspace::{subspace_covariance, subspace_jacobian};

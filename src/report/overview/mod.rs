@@ -66,7 +66,7 @@ impl<'a> Watched<'a> {
     }
 
     /// What was seen of the recordings that were read whole.
-    pub(crate) fn overview(&self) -> Overview {
+    pub fn overview(&self) -> Overview {
         let sample_time = self.records.sample_time();
         let inputs = self.records.inputs().len();
         let recordings = self.records.recordings();

@@ -8,11 +8,12 @@ mod plant_validation;
 mod simulator_document;
 
 pub use parameter_document::ParameterDocument;
-pub(crate) use plant_document::is_plant;
 pub use plant_document::{
     FitDocument, InitialStateDocument, NoiseDocument, PLANT_FORMAT, PlantDocument, TestDocument,
+    is_plant,
 };
 pub use plant_fit::plant_fits;
+#[cfg(feature = "cli")]
 pub(crate) use plant_linearisation::logarithmic;
 pub use plant_linearisation::{
     IdentifiedDocument, LINEARISATION_FORMAT, LinearisationDocument, OperatingValue, Uncertain,

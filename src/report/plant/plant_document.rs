@@ -351,7 +351,7 @@ impl PlantDocument {
 }
 
 /// Whether `text` is JSON that calls itself a plant.
-pub(crate) fn is_plant(text: &str) -> bool {
+pub fn is_plant(text: &str) -> bool {
     #[derive(serde::Deserialize)]
     struct Probe {
         format: String,

@@ -1,29 +1,38 @@
 //! Tables for people: nothing wider than a hundred columns.
 
+#[cfg(feature = "cli")]
 mod effects_text;
 mod explanation_text;
 mod model;
 mod number;
 mod plant;
+#[cfg(feature = "cli")]
 mod reproduction_text;
 mod table;
 
+#[cfg(feature = "cli")]
 pub(crate) use effects_text::effects_text;
 pub use explanation_text::explanation_text;
 pub(crate) use model::comparison;
 pub use model::{ModelText, model_text, show_text, validation_text, verdict};
+#[cfg(feature = "report")]
 pub(crate) use model::{
     doubtful, findings, fit_table, gain_table, linearity_tested, method, order_table, pole_table,
     test_tables, too_short,
 };
+#[cfg(feature = "report")]
 pub(crate) use number::percent;
+#[cfg(feature = "cli")]
 pub(crate) use plant::linearisation_text;
+#[cfg(feature = "report")]
 pub(crate) use plant::{
     initial_state_table, leaves_something_out, parameter_table, residual_test_table,
     verdict as plant_verdict,
 };
 pub use plant::{plant_estimate_text, plant_text, plant_validation_text};
+#[cfg(feature = "cli")]
 pub(crate) use reproduction_text::reproduction_text;
+#[cfg(feature = "report")]
 pub(crate) use table::Table;
 
 /// Widest line.
