@@ -1,10 +1,12 @@
 //! Reading, moments by both routes, fit, covariance. Rules: `benches/README.md`.
 
 use divan::{Bencher, black_box};
-use innovant::identify::{Order, Polish, fit};
+use innovant::identify::Detrend;
+use innovant::identify::{Order, Polish};
+use innovant::internal::identify::fit;
+use innovant::internal::moments::{LagAccumulator, PanelQr, Trend};
+use innovant::internal::systems::van_wingerden_one;
 use innovant::log::{Log, LogReader, RoleNeed, Roles, Source};
-use innovant::moments::{Detrend, LagAccumulator, PanelQr, Trend};
-use innovant::systems::van_wingerden_one;
 use innovant::{Options, identify};
 
 fn main() {

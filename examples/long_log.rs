@@ -6,8 +6,8 @@
 
 use std::path::Path;
 
+use innovant::internal::systems::{channels, van_wingerden_one};
 use innovant::log::{Block, CsvWriter};
-use innovant::systems::{channels, van_wingerden_one};
 
 /// Samples written at a time.
 const BLOCK: usize = 16_384;

@@ -4,8 +4,9 @@
 use std::time::Instant;
 
 use innovant::identify::MemoryRecords;
+use innovant::internal::systems;
 use innovant::validate::identify_and_test;
-use innovant::{Options, identify, systems};
+use innovant::{Options, identify};
 
 const RUNS: usize = 15;
 

@@ -6,7 +6,7 @@
 mod variance;
 
 use innovant::identify::{Method, Weight};
-use innovant::systems::{chiuso_picci_frequencies, chiuso_picci_one, chiuso_picci_two};
+use innovant::internal::systems::{chiuso_picci_frequencies, chiuso_picci_one, chiuso_picci_two};
 use variance::Study;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

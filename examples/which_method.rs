@@ -8,9 +8,9 @@ use std::time::Instant;
 
 use innovant::covariance::{Path, frequency_response_covariance, interval_quantile};
 use innovant::identify::{Method, Options, Order, Polish, identify};
+use innovant::internal::systems;
 use innovant::log::Log;
 use innovant::model::StateSpace;
-use innovant::systems;
 use rayon::prelude::*;
 
 /// Runs of each situation, unless the command line says otherwise.

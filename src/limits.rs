@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The environment variable with the limit.
-pub const VARIABLE: &str = "INNOVANT_MEMORY";
+pub(crate) const VARIABLE: &str = "INNOVANT_MEMORY";
 /// Where neither the machine nor the control group says how much memory there is.
 const UNKNOWN_MACHINE: u64 = 4 << 30;
 
@@ -98,7 +98,7 @@ pub fn set_memory_limit(bytes: Option<u64>) {
 ///
 /// # Errors
 /// [`LimitError::Variable`] when `INNOVANT_MEMORY` is needed and no size.
-pub fn memory_limit() -> Result<MemoryLimit, LimitError> {
+pub(crate) fn memory_limit() -> Result<MemoryLimit, LimitError> {
     let of = |bytes, origin| Ok(MemoryLimit { bytes, origin });
     let asked = ASKED.load(Ordering::Relaxed);
     if asked > 0 {
@@ -122,7 +122,7 @@ pub fn memory_limit() -> Result<MemoryLimit, LimitError> {
 ///
 /// # Errors
 /// [`LimitError`].
-pub fn check(
+pub(crate) fn check(
     needed: u64,
     own: Option<u64>,
     what: impl FnOnce() -> String,

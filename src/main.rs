@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    innovant::cli::run(std::env::args_os())
+    innovant::internal::cli::run(std::env::args_os())
 }

@@ -18,8 +18,10 @@ mod knudsen;
 
 pub use acoustic_duct::acoustic_duct;
 pub use chiuso_picci::{chiuso_picci_frequencies, chiuso_picci_one, chiuso_picci_two};
-pub use closed_loop::{ClosedLoop, JointModel};
-pub use knudsen::{KnudsenExample, armax_parameters, knudsen_armax, knudsen_bj, knudsen_vo};
+pub use closed_loop::ClosedLoop;
+pub(crate) use closed_loop::JointModel;
+pub(crate) use knudsen::armax_parameters;
+pub use knudsen::{KnudsenExample, knudsen_armax, knudsen_bj, knudsen_vo};
 
 /// A plant with its noise and, perhaps, the feedback it runs under: `u[k] = F y[k] + reference[k]`.
 #[derive(Debug, Clone)]

@@ -17,7 +17,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use folder::{Folder, json};
-use innovant::systems;
+use innovant::internal::systems;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

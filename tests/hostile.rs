@@ -9,9 +9,9 @@ use std::io::Cursor;
 
 use innovant::explain::{ExplainError, Simulation, explain};
 use innovant::identify::{Method, Options, Order};
+use innovant::internal::systems::{servo, two_by_two};
 use innovant::log::{Log, LogError, Roles};
 use innovant::report::{is_explanation, parse_explanation, parse_model};
-use innovant::systems::{servo, two_by_two};
 use innovant::{IdentifyError, identify};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

@@ -2,8 +2,8 @@
 //!
 //! `cargo test --release --test knudsen_study -- --nocapture` prints the tables.
 
-use innovant::identify::baselines::TableTwo;
-use innovant::systems::{KnudsenExample, knudsen_armax, knudsen_bj, knudsen_vo};
+use innovant::internal::identify::TableTwo;
+use innovant::internal::systems::{KnudsenExample, knudsen_armax, knudsen_bj, knudsen_vo};
 use rayon::prelude::*;
 
 const RUNS: u64 = 200;

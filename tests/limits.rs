@@ -8,9 +8,9 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use folder::Folder;
-use innovant::limits::parse_size;
+use innovant::internal::limits::parse_size;
+use innovant::internal::systems;
 use innovant::log::{Channel, Log};
-use innovant::systems;
 use rayon::prelude::*;
 
 /// A refusal is a matter of reading the header; this allows for a machine that is busy.

@@ -5,7 +5,7 @@
 
 use innovant::covariance::impulse_response_std;
 use innovant::identify::{CovarianceKind, Order, Polish};
-use innovant::systems::{TestSystem, servo, van_wingerden_one};
+use innovant::internal::systems::{TestSystem, servo, van_wingerden_one};
 use innovant::{Options, identify};
 use rayon::prelude::*;
 

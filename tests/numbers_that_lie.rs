@@ -9,9 +9,9 @@
 //! recordings of each kind, `INNOVANT_LIE_ONLY` for the kinds whose name holds a text.
 
 use innovant::identify::{MemoryRecords, Options};
+use innovant::internal::systems::{TestSystem, van_wingerden_one};
 use innovant::log::Log;
 use innovant::model::StateSpace;
-use innovant::systems::{TestSystem, van_wingerden_one};
 use innovant::validate::identify_and_test;
 use nalgebra::{DMatrix, Matrix2};
 use rayon::prelude::*;

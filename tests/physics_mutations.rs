@@ -207,7 +207,7 @@ fn examine(text: &str) -> bool {
     if let Ok(run) = plant.simulate(&plant.nominal(), &excitation, None) {
         assert!(run.outputs.iter().all(|y| y.len() == column.len()));
     }
-    drop(innovant::report::text::plant_text(&plant));
+    drop(innovant::internal::report::plant_text(&plant));
     assert_eq!(plant.spec.states().len(), count);
     true
 }

@@ -6,9 +6,10 @@ mod folder;
 
 use std::fs;
 
+use innovant::internal::report::text_alone;
 use innovant::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
 use innovant::physics::{Excitation, Hold, OperatingPoint, Plant, parse};
-use innovant::report::{LinearisationDocument, PlantDocument, Uncertain, judge_plant, text_alone};
+use innovant::report::{LinearisationDocument, PlantDocument, Uncertain, judge_plant};
 use nalgebra::{DMatrix, dmatrix};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

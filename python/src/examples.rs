@@ -1,6 +1,6 @@
 //! Recordings of known plants, for documentation and tests.
 
-use innovant::systems::{TestSystem, servo, van_wingerden_one};
+use innovant::internal::systems::{TestSystem, servo, van_wingerden_one};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 

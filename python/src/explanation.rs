@@ -7,8 +7,8 @@ use innovant::explain::{
     explain_plant as explain_equations,
 };
 use innovant::identify::Recording;
-use innovant::log::write_file_atomically;
-use innovant::report::text::explanation_text;
+use innovant::internal::log::write_file_atomically;
+use innovant::internal::report::explanation_text;
 use innovant::report::{explanation_page, parse_explanation, to_json};
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;

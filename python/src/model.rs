@@ -5,12 +5,14 @@ use std::path::PathBuf;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use innovant::Options;
+use innovant::identify::Detrend;
 use innovant::identify::{IdentifyError, Records, identify_records};
-use innovant::log::write_file_atomically;
-use innovant::moments::Detrend;
-use innovant::report::text::{ModelText, Style, model_text, validation_text, verdict};
+use innovant::internal::log::write_file_atomically;
+use innovant::internal::report::{ModelText, Style, model_text, validation_text, verdict};
+use innovant::internal::validate::test_residuals;
+use innovant::internal::validate::{Deviations, Zero, judge};
 use innovant::report::{ModelDocument, identification_page, parse_model, to_json};
-use innovant::validate::{Deviations, Relation, TestedModel, Zero, judge, test_residuals};
+use innovant::validate::{Relation, TestedModel};
 use nalgebra::DVector;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, ToPyArray};
 use pyo3::prelude::*;

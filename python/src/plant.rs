@@ -1,5 +1,7 @@
 //! Plants in equations.
 
+use innovant::internal::report::{Style, plant_estimate_text, plant_text, plant_validation_text};
+use innovant::internal::report::{frequency_grid, plant_fits, text_alone};
 use innovant::log::Channel;
 use innovant::physics::estimate::{
     EstimateOptions, Form, Held, PlantRecording, estimate, evaluate,
@@ -7,10 +9,8 @@ use innovant::physics::estimate::{
 use innovant::physics::{
     Excitation, Hold, OperatingPoint, Plant as Core, Point, VariableId, diagnose, render_all,
 };
-use innovant::report::text::{Style, plant_estimate_text, plant_text, plant_validation_text};
 use innovant::report::{
-    LinearisationDocument, PlantDocument, Uncertain, frequency_grid, judge_plant, plant_fits,
-    plant_page, text_alone, to_json,
+    LinearisationDocument, PlantDocument, Uncertain, judge_plant, plant_page, to_json,
 };
 use numpy::PyArray2;
 use pyo3::prelude::*;

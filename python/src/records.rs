@@ -42,7 +42,7 @@ impl<'a> ArrayRecords<'a> {
         inputs: &[String],
         outputs: &[String],
     ) -> Result<Self, LogError> {
-        if !innovant::log::is_sample_time(sample_time) {
+        if !innovant::internal::log::is_sample_time(sample_time) {
             return Err(LogError::InvalidSampleTime { sample_time });
         }
         let count = u.len();

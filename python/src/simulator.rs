@@ -2,11 +2,12 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use innovant::internal::report::plant_fits;
+use innovant::internal::report::{Style, plant_estimate_text};
 use innovant::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
 use innovant::physics::external::{ExternalParameter, ExternalPlant, ExternalSimulator, Failure};
 use innovant::physics::{Excitation, Hold};
-use innovant::report::text::{Style, plant_estimate_text};
-use innovant::report::{PlantDocument, SimulatorDocument, plant_fits};
+use innovant::report::{PlantDocument, SimulatorDocument};
 use numpy::IntoPyArray;
 use numpy::ndarray::Array2;
 use pyo3::prelude::*;

@@ -1,6 +1,7 @@
 //! Columns of data frames, found by the rules of the command line.
 
-use innovant::log::{RoleNeed, Roles, TableRoles, time_base_of};
+use innovant::internal::log::{TableRoles, time_base_of};
+use innovant::log::{RoleNeed, Roles};
 use pyo3::prelude::*;
 
 use crate::errors::raise;

@@ -10,15 +10,6 @@
 //! | `job` | one log: its model from before, or a new one |
 //! | `row` | what is said of it |
 //! | `summary_csv` | all rows as CSV |
-//!
-//! ```no_run
-//! use innovant::batch::{Batch, run, summary_csv};
-//!
-//! let batch = Batch { output_dir: "models".into(), ..Batch::default() };
-//! let rows = run(&["monday.csv".into(), "tuesday.csv".into()], &batch, &|row| println!("{}", row.name))?;
-//! println!("{}", summary_csv(&rows)?);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
 mod job;
 mod row;
@@ -34,27 +25,27 @@ use crate::identify::Options;
 use crate::limits::{LimitError, memory_limit};
 use crate::log::Roles;
 
-pub use row::{Row, Status};
-pub use summary_csv::summary_csv;
+pub(crate) use row::{Row, Status};
+pub(crate) use summary_csv::summary_csv;
 
 /// How many logs are to be identified.
 #[derive(Debug, Clone, Default)]
-pub struct Batch {
+pub(crate) struct Batch {
     /// Where the models go: the name of a log with `.json` in the place of `.csv`.
-    pub output_dir: PathBuf,
+    pub(crate) output_dir: PathBuf,
     /// Column roles, of every log.
-    pub roles: Roles,
+    pub(crate) roles: Roles,
     /// Options of every identification.
-    pub options: Options,
+    pub(crate) options: Options,
     /// Identifies again also what is there already.
-    pub again: bool,
+    pub(crate) again: bool,
 }
 
 /// Why a batch cannot be begun.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages explain the fields")]
-pub enum BatchError {
+pub(crate) enum BatchError {
     /// Two models would go into one file.
     #[error(
         "{first} and {second} would both become {model}: rename one of them, or run two batches with two output \
@@ -86,7 +77,7 @@ pub enum BatchError {
 /// # Errors
 /// [`BatchError`] before any work, when two models would have one name or the directory cannot be made. What goes wrong
 /// with one log is in its [`Row`].
-pub fn run(
+pub(crate) fn run(
     logs: &[PathBuf],
     batch: &Batch,
     done: &(dyn Fn(&Row) + Sync),

@@ -11,7 +11,7 @@ use crate::validate::Validation;
 /// What became of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Status {
+pub(crate) enum Status {
     /// A model was made.
     Identified,
     /// The model that was there already, made from the same bytes with the same options.
@@ -22,27 +22,27 @@ pub enum Status {
 
 /// A row of the summary. What a log without a model does not have is empty.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Row {
+pub(crate) struct Row {
     /// The log, as it was named.
-    pub name: String,
+    pub(crate) name: String,
     /// What became of it.
-    pub status: Status,
+    pub(crate) status: Status,
     /// Order of the model.
-    pub order: Option<usize>,
+    pub(crate) order: Option<usize>,
     /// Samples of the log.
-    pub samples: Option<usize>,
+    pub(crate) samples: Option<usize>,
     /// Fit one step ahead in percent.
-    pub fit_percent: Option<f64>,
+    pub(crate) fit_percent: Option<f64>,
     /// Fit of the free run in percent; empty also where there is no free run.
-    pub free_run_fit_percent: Option<f64>,
+    pub(crate) free_run_fit_percent: Option<f64>,
     /// One sentence: what the model is, and whether to trust it.
-    pub verdict: String,
+    pub(crate) verdict: String,
     /// What the tests found, and what to know before trusting the model; separated by `; `.
-    pub findings: String,
+    pub(crate) findings: String,
     /// Wall-clock time it took.
-    pub seconds: f64,
+    pub(crate) seconds: f64,
     /// What went wrong.
-    pub message: String,
+    pub(crate) message: String,
 }
 
 impl Row {

@@ -9,7 +9,7 @@ const DECIMALS: f64 = 1000.0;
 ///
 /// # Errors
 /// [`csv::Error`], which memory to write to does not give.
-pub fn summary_csv(rows: &[Row]) -> Result<String, csv::Error> {
+pub(crate) fn summary_csv(rows: &[Row]) -> Result<String, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows {
         let rounded = |value: f64| (value * DECIMALS).round() / DECIMALS;

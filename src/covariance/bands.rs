@@ -23,7 +23,7 @@ use crate::model::StateSpace;
 /// band then covers 93.2%, a 99% band 97.3% (at 0.2: 94.7% and 98.1%; computed with 400 000 draws), and it
 /// falls quickly beyond; in the studies behind this crate the linearisation fails at relative errors above
 /// 0.3 (`pbsid-opt.md` section 5).
-pub const LARGEST_RELATIVE_STD: f64 = 0.3;
+pub(crate) const LARGEST_RELATIVE_STD: f64 = 0.3;
 
 /// Distance from a pole to the point `exp(j w Ts)`, in standard deviations of the pole, below which the
 /// linearisation is not used there.
@@ -33,11 +33,11 @@ pub const LARGEST_RELATIVE_STD: f64 = 0.3;
 /// ellipse of `G` is then needle-thin while `G` itself is curved in the pole, and covers 50 to 75% instead
 /// of 95% (`chiuso-picci.md` section 4). Far from such a pole on the circle the same response is harmless,
 /// so the distance is taken point by point.
-pub const SMALLEST_POLE_DISTANCE: f64 = 3.0;
+pub(crate) const SMALLEST_POLE_DISTANCE: f64 = 3.0;
 
 /// Number of parameter draws behind an empirical band. The 97.5% point of 1000 draws has a standard error of
 /// 8% of a standard deviation.
-pub const DRAWS: usize = 1000;
+pub(crate) const DRAWS: usize = 1000;
 
 /// How a band was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -73,8 +73,8 @@ pub struct ResponseBand {
 ///
 /// Linear bands are symmetric on `log|G|`, `|G| exp(+- z sd(|G|) / |G|)`, and on the phase, with normal
 /// or Student quantiles by the degrees of freedom of the covariance. Where the linearisation is not to be
-/// trusted ([`LARGEST_RELATIVE_STD`], [`SMALLEST_POLE_DISTANCE`]) they are quantiles over [`DRAWS`] models
-/// from [`draw_parameters`](super::draw_parameters), and a lower limit is zero where zero lies in the
+/// trusted (`LARGEST_RELATIVE_STD`, `SMALLEST_POLE_DISTANCE`) they are quantiles over `DRAWS` models
+/// from `draw_parameters`, and a lower limit is zero where zero lies in the
 /// confidence ellipse of `G`: draws around an estimate that noise has moved away from zero do not reach it.
 ///
 /// # Errors

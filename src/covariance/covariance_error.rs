@@ -5,6 +5,7 @@ use crate::model::ModelError;
 
 /// A covariance that does not belong to the model, or a factorisation that failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CovarianceError {
     /// The layout speaks of another number of states, inputs or outputs.
     #[error(

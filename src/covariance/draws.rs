@@ -29,7 +29,7 @@ const TANGENT_RANK: f64 = 1e-10;
 /// # Errors
 /// [`CovarianceError::Layout`] or [`CovarianceError::Size`] for the covariance of another model,
 /// [`CovarianceError::Linalg`] when a factorisation fails.
-pub fn draw_parameters(
+pub(crate) fn draw_parameters(
     system: &StateSpace,
     covariance: &ParameterCovariance,
     count: usize,

@@ -12,7 +12,7 @@ use super::parameters::{ParameterCovariance, ParameterLayout};
 
 /// Covariance from the parameters estimated without each of the blocks, all in the same state basis.
 /// `None` for fewer than three blocks.
-pub fn jackknife_covariance(
+pub(crate) fn jackknife_covariance(
     layout: ParameterLayout,
     replicates: &[Vec<f64>],
 ) -> Option<ParameterCovariance> {

@@ -31,9 +31,7 @@ mod residual_budget;
 mod test_covariances;
 
 pub(crate) use bands::linear_band;
-pub use bands::{
-    BandMethod, DRAWS, LARGEST_RELATIVE_STD, ResponseBand, SMALLEST_POLE_DISTANCE, response_bands,
-};
+pub use bands::{BandMethod, ResponseBand, response_bands};
 pub use covariance_error::CovarianceError;
 pub use delta_method::{
     Covariance2, Path, PoleUncertainty, frequency_response_covariance, impulse_response_std,
@@ -41,11 +39,10 @@ pub use delta_method::{
     zero_uncertainties,
 };
 pub(crate) use delta_method::{DEFECTIVE, continuous_stds, projected_variance};
-pub use draws::draw_parameters;
 pub use invariants::invariants;
 pub(crate) use invariants::response_point;
 pub use invariants_document::{Invariants, ResponsePoint, Root, StaticGain, StepResponse};
-pub use jackknife::jackknife_covariance;
+pub(crate) use jackknife::jackknife_covariance;
 pub use parameters::{ParameterCovariance, ParameterLayout};
 pub use quantile::{ellipse_quantile, interval_quantile};
 pub(crate) use residual_budget::{MOST_LAGS, numbers_of_tests, samples_followed};

@@ -67,7 +67,7 @@ impl ParameterLayout {
 
     /// Number of parameters that the input-output behaviour determines: `n (r + 2 l)`, plus `l r` with
     /// `D`. The other `n^2` are the choice of the state basis.
-    pub fn identifiable(&self) -> usize {
+    pub(crate) fn identifiable(&self) -> usize {
         self.states * (self.inputs + 2 * self.outputs)
             + if self.feedthrough {
                 self.outputs * self.inputs

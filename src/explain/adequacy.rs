@@ -39,21 +39,21 @@ const OF_CLASS: f64 = 0.1;
 /// What a residual still holds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Adequacy {
-    pub features: usize,
-    pub p_value: f64,
+    pub(crate) features: usize,
+    pub(crate) p_value: f64,
     /// Share of the whitened residual's variance that is explained, less what chance explains.
-    pub share: f64,
+    pub(crate) share: f64,
     /// Share of the variance of the simulation error itself, not whitened, that is structure: what is above the noise.
-    pub share_of_error: f64,
+    pub(crate) share_of_error: f64,
     /// The same, over what the explanation has removed from the error before it; infinite without one.
-    pub of_removed: f64,
+    pub(crate) of_removed: f64,
     /// The share of it that the named laws may be wrong by.
-    pub tolerated: f64,
+    pub(crate) tolerated: f64,
 }
 
 impl Adequacy {
     /// Whether the explanation suffices.
-    pub fn holds(&self) -> bool {
+    pub(crate) fn holds(&self) -> bool {
         self.p_value > LEVEL
             || if self.of_removed.is_finite() {
                 self.of_removed < self.tolerated
@@ -63,14 +63,14 @@ impl Adequacy {
     }
 
     /// What the structure that is left is worth in a likelihood of `count` values.
-    pub fn gain(&self, count: usize) -> f64 {
+    pub(crate) fn gain(&self, count: usize) -> f64 {
         -(count as f64) * (-self.share.min(0.999_999)).ln_1p()
     }
 
     /// The same for a plant of another class than the linear one. What it removes is slow, and an autoregression of order
     /// one, under which this test is made, counts that for little; so it is measured as simulation error, whose mean
     /// square was `before` and is `now`.
-    pub fn of_class(self, before: f64, now: f64) -> Self {
+    pub(crate) fn of_class(self, before: f64, now: f64) -> Self {
         if self.holds() {
             return self;
         }

@@ -24,27 +24,27 @@ use crate::noise::Mask;
 const TRACE_POINTS: usize = 1500;
 
 pub(crate) struct Answer<'a> {
-    pub recordings: &'a [Log],
-    pub known: &'a Known,
-    pub finding: &'a Finding,
-    pub mask: Mask,
-    pub seed: u64,
+    pub(crate) recordings: &'a [Log],
+    pub(crate) known: &'a Known,
+    pub(crate) finding: &'a Finding,
+    pub(crate) mask: Mask,
+    pub(crate) seed: u64,
 }
 
 impl Answer<'_> {
-    pub fn data(&self) -> &Data {
+    pub(crate) fn data(&self) -> &Data {
         &self.known.data
     }
 
-    pub fn inputs(&self) -> &[Channel] {
+    pub(crate) fn inputs(&self) -> &[Channel] {
         &self.recordings[0].inputs
     }
 
-    pub fn outputs(&self) -> &[Channel] {
+    pub(crate) fn outputs(&self) -> &[Channel] {
         &self.recordings[0].outputs
     }
 
-    pub fn names(&self) -> (Vec<String>, Vec<String>) {
+    pub(crate) fn names(&self) -> (Vec<String>, Vec<String>) {
         let of = |list: &[Channel]| list.iter().map(|c| c.name.clone()).collect();
         (of(self.inputs()), of(self.outputs()))
     }

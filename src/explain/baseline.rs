@@ -19,16 +19,16 @@ const MOST_ORDER: usize = 8;
 /// What a column of simulated outputs tells about the simulator.
 #[derive(Debug, Clone)]
 pub(crate) struct Simulator {
-    pub plant: Plant,
+    pub(crate) plant: Plant,
     /// State at the beginning of each segment.
-    pub initial: Vec<Vec<f64>>,
+    pub(crate) initial: Vec<Vec<f64>>,
     /// Root mean square of what the linear system misses, over that of the simulated outputs.
-    pub misfit: f64,
+    pub(crate) misfit: f64,
 }
 
 impl Simulator {
     /// Whether the simulator is linear to rounding.
-    pub fn is_linear(&self) -> bool {
+    pub(crate) fn is_linear(&self) -> bool {
         self.misfit < LINEAR
     }
 }
@@ -56,16 +56,16 @@ pub(crate) fn identify_simulator(data: &Data) -> Option<Simulator> {
 /// Regression of the outputs on the present inputs and the past of all channels, each scaled to one size.
 pub(super) struct Autoregression {
     /// Rows `[u(k), z(k-1), ..., z(k-order)]` with `z = [u; y]`, then a one if there is a constant.
-    pub regressors: DMatrix<f64>,
+    pub(super) regressors: DMatrix<f64>,
     /// Rows `y(k)`.
-    pub targets: DMatrix<f64>,
-    pub input_scale: Vec<f64>,
-    pub output_scale: Vec<f64>,
+    pub(super) targets: DMatrix<f64>,
+    pub(super) input_scale: Vec<f64>,
+    pub(super) output_scale: Vec<f64>,
 }
 
 impl Autoregression {
     /// `None` with too few samples for so many coefficients.
-    pub fn new(data: &Data, order: usize, constant: bool) -> Option<Self> {
+    pub(crate) fn new(data: &Data, order: usize, constant: bool) -> Option<Self> {
         let (r, l) = (data.inputs, data.outputs);
         let rows: usize = data
             .segments
@@ -110,7 +110,7 @@ impl Autoregression {
     }
 
     /// Column of a channel of `z` at a lag.
-    pub fn column(data: &Data, lag: usize, channel: usize) -> usize {
+    pub(crate) fn column(data: &Data, lag: usize, channel: usize) -> usize {
         if lag == 0 {
             channel
         } else {

@@ -21,19 +21,19 @@ const INDEPENDENT: f64 = 1e-7;
 #[derive(Debug, Clone)]
 pub(crate) struct Coordinates {
     /// The given plant in these coordinates.
-    pub given: Plant,
+    pub(crate) given: Plant,
     /// Rows of `A` that are free.
-    pub free_rows: Vec<usize>,
+    pub(crate) free_rows: Vec<usize>,
     /// Inputs whose column of `B` is free: those that the given plant responds to.
-    pub active_inputs: Vec<usize>,
+    pub(crate) active_inputs: Vec<usize>,
     /// Takes the given state to these coordinates: `x_here = to_here * x_given`.
-    pub to_here: DMatrix<f64>,
+    pub(crate) to_here: DMatrix<f64>,
     rows: OnceLock<Functionals>,
 }
 
 impl Coordinates {
     /// Coordinates around `plant`. Modes that no output sees are dropped.
-    pub fn new(plant: &Plant) -> Self {
+    pub(crate) fn new(plant: &Plant) -> Self {
         let n = plant.states;
         let scale = increment_scale(plant);
         let delta = (plant.a_matrix() - DMatrix::identity(n, n)) / scale;
@@ -86,7 +86,7 @@ impl Coordinates {
     }
 
     /// Those of a plant that stays as it is.
-    pub fn fixed(plant: Plant, active_inputs: Vec<usize>) -> Self {
+    pub(crate) fn fixed(plant: Plant, active_inputs: Vec<usize>) -> Self {
         Self {
             free_rows: Vec::new(),
             active_inputs,
@@ -97,7 +97,7 @@ impl Coordinates {
     }
 
     /// The same numbers free, around another plant in these coordinates.
-    pub fn around(&self, plant: Plant) -> Self {
+    pub(crate) fn around(&self, plant: Plant) -> Self {
         Self {
             given: plant,
             free_rows: self.free_rows.clone(),
@@ -108,17 +108,17 @@ impl Coordinates {
     }
 
     /// What can be read off the state of the given plant.
-    pub fn given_rows(&self) -> &Functionals {
+    pub(crate) fn given_rows(&self) -> &Functionals {
         self.rows.get_or_init(|| Functionals::new(&self.given))
     }
 
     /// Numbers of `A` and `B` that are free.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.given.states * (self.free_rows.len() + self.active_inputs.len())
     }
 
     /// The free numbers of `plant`, which must be in these coordinates: rows of `A`, then columns of `B`.
-    pub fn numbers(&self, plant: &Plant) -> Vec<f64> {
+    pub(crate) fn numbers(&self, plant: &Plant) -> Vec<f64> {
         let n = plant.states;
         let mut numbers = Vec::with_capacity(self.len());
         for &row in &self.free_rows {
@@ -131,7 +131,7 @@ impl Coordinates {
     }
 
     /// The plant with these free numbers.
-    pub fn plant(&self, numbers: &[f64]) -> Plant {
+    pub(crate) fn plant(&self, numbers: &[f64]) -> Plant {
         let mut plant = self.given.clone();
         let n = plant.states;
         let (a_part, b_part) = numbers.split_at(n * self.free_rows.len());
@@ -211,11 +211,11 @@ fn tidy(plant: &mut Plant, chains: &[Vec<usize>], scale: f64) {
 #[derive(Debug, Clone)]
 pub(crate) struct Derivatives {
     /// `C A_c`, a row an output (`l x n`).
-    pub rate: Vec<Vec<f64>>,
+    pub(crate) rate: Vec<Vec<f64>>,
     /// `C B_c`, a row an output (`l x r`): what an input adds to the derivative directly.
-    pub rate_feedthrough: Vec<Vec<f64>>,
+    pub(crate) rate_feedthrough: Vec<Vec<f64>>,
     /// `C A_c^-1`, a row an output, where that exists.
-    pub integral: Option<Vec<Vec<f64>>>,
+    pub(crate) integral: Option<Vec<Vec<f64>>>,
 }
 
 /// `A_c h` and `B_c h` of the continuous plant that `plant` is the zero-order-hold equivalent of; where there is none (a pole
@@ -262,7 +262,7 @@ pub(crate) fn moment_columns(plant: &Plant) -> Vec<[Vec<f64>; 2]> {
 impl Derivatives {
     /// Of the continuous plant that `plant` is the zero-order-hold equivalent of; where there is none (a pole on the
     /// negative real axis), of the increments.
-    pub fn new(plant: &Plant) -> Self {
+    pub(crate) fn new(plant: &Plant) -> Self {
         let l = plant.outputs;
         let h = plant.sample_time;
         let c = plant.c_matrix();

@@ -4,15 +4,15 @@
 #[derive(Debug, Clone)]
 pub(crate) struct Segment {
     /// `inputs[channel][sample]`.
-    pub inputs: Vec<Vec<f64>>,
+    pub(crate) inputs: Vec<Vec<f64>>,
     /// `outputs[channel][sample]`.
-    pub outputs: Vec<Vec<f64>>,
+    pub(crate) outputs: Vec<Vec<f64>>,
     /// Time of the first sample in seconds.
-    pub start_time: f64,
+    pub(crate) start_time: f64,
 }
 
 impl Segment {
-    pub fn samples(&self) -> usize {
+    pub(crate) fn samples(&self) -> usize {
         self.inputs
             .first()
             .or_else(|| self.outputs.first())
@@ -23,12 +23,12 @@ impl Segment {
 /// All recordings that are explained together.
 #[derive(Debug, Clone)]
 pub(crate) struct Data {
-    pub segments: Vec<Segment>,
-    pub sample_time: f64,
-    pub inputs: usize,
-    pub outputs: usize,
+    pub(crate) segments: Vec<Segment>,
+    pub(crate) sample_time: f64,
+    pub(crate) inputs: usize,
+    pub(crate) outputs: usize,
     /// The last input is the constant 1, through which operating points enter.
-    pub constant: bool,
+    pub(crate) constant: bool,
 }
 
 pub(crate) use crate::noise::Series;
@@ -43,17 +43,17 @@ pub(crate) fn difference(a: &Series, b: &Series) -> Series {
 
 impl Data {
     /// Samples over all segments (a sample holds all channels).
-    pub fn samples(&self) -> usize {
+    pub(crate) fn samples(&self) -> usize {
         self.segments.iter().map(Segment::samples).sum()
     }
 
     /// Inputs that are signals: all but the constant.
-    pub fn signals(&self) -> usize {
+    pub(crate) fn signals(&self) -> usize {
         self.inputs - usize::from(self.constant)
     }
 
     /// Measured outputs minus `simulated`.
-    pub fn residual(&self, simulated: &Series) -> Series {
+    pub(crate) fn residual(&self, simulated: &Series) -> Series {
         self.outputs_as_series()
             .zip(simulated)
             .map(|(y, s)| y.iter().zip(s).map(|(y, s)| y - s).collect())
@@ -61,19 +61,19 @@ impl Data {
     }
 
     /// The recorded outputs, series by series.
-    pub fn outputs_as_series(&self) -> impl Iterator<Item = &Vec<f64>> {
+    pub(crate) fn outputs_as_series(&self) -> impl Iterator<Item = &Vec<f64>> {
         self.segments.iter().flat_map(|s| s.outputs.iter())
     }
 
     /// Standard deviation of each output over all segments.
-    pub fn output_scale(&self) -> Vec<f64> {
+    pub(crate) fn output_scale(&self) -> Vec<f64> {
         (0..self.outputs)
             .map(|o| deviation(self.segments.iter().flat_map(|s| s.outputs[o].iter())))
             .collect()
     }
 
     /// Standard deviation of each input over all segments.
-    pub fn input_scale(&self) -> Vec<f64> {
+    pub(crate) fn input_scale(&self) -> Vec<f64> {
         (0..self.inputs)
             .map(|i| deviation(self.segments.iter().flat_map(|s| s.inputs[i].iter())))
             .collect()

@@ -24,7 +24,7 @@ impl Bench<'_> {
     /// What a flexible set of features gains: `(gain, what there was, number of features)`. The laws are evaluated along
     /// the motion of `moving`: the basis itself, or the simulation as given where a misfit has taken the motion out of
     /// the basis.
-    pub fn feature_gain(&self, moving: &Fit) -> Option<(f64, f64, usize)> {
+    pub(crate) fn feature_gain(&self, moving: &Fit) -> Option<(f64, f64, usize)> {
         let plant = moving.structure.plant(&moving.theta);
         let signals = motions(self.problem, moving, &plant);
         let rows = Functionals::new(&plant);
@@ -189,7 +189,7 @@ impl Bench<'_> {
     }
 
     /// A static law of `values` through input `drive`: hats at `knots`, `(gain, coefficients, covariance)`.
-    pub fn static_law(
+    pub(crate) fn static_law(
         &self,
         drive: usize,
         values: &[Vec<f64>],

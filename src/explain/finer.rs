@@ -28,7 +28,7 @@ pub(crate) struct Finer {
 
 impl Finer {
     /// `steps` steps a sample; `None` where the plant has no continuous equivalent (a pole on the negative real axis).
-    pub fn new(plant: &Plant, steps: usize) -> Option<Self> {
+    pub(crate) fn new(plant: &Plant, steps: usize) -> Option<Self> {
         let n = plant.states;
         let log = crate::linalg::logarithm(&plant.a_matrix())?;
         let a = crate::linalg::exponential(&(log / steps as f64));
@@ -46,7 +46,7 @@ impl Finer {
     }
 
     /// As [`run`] of `plant`, whose state matrix this was made of.
-    pub fn run(
+    pub(crate) fn run(
         &self,
         plant: &Plant,
         forces: &[ActiveForce],

@@ -21,25 +21,25 @@ use crate::noise::{Colours, Mask, Noise, sum_of_squares};
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
     /// Rounds of noise estimation.
-    pub rounds: usize,
+    pub(crate) rounds: usize,
     /// Sets of derivatives a round: they are what costs.
-    pub derivatives: usize,
+    pub(crate) derivatives: usize,
     /// Steps that are made with one set before it is taken anew.
-    pub steps_each: usize,
+    pub(crate) steps_each: usize,
     /// Whether a set is updated from what each step has shown: far from the optimum it changes quickly.
-    pub updates: bool,
+    pub(crate) updates: bool,
     /// The deviance has settled when a step lowers it by less.
-    pub settled: f64,
+    pub(crate) settled: f64,
 }
 
 impl Effort {
     /// To see whether a candidate leads anywhere.
-    pub const GLANCE: Self = Self {
+    pub(crate) const GLANCE: Self = Self {
         derivatives: 1,
         ..Self::SCOUT
     };
     /// To see what deserves more.
-    pub const SCOUT: Self = Self {
+    pub(crate) const SCOUT: Self = Self {
         rounds: 1,
         derivatives: 2,
         steps_each: 4,
@@ -47,7 +47,7 @@ impl Effort {
         settled: 0.5,
     };
     /// To rank candidates.
-    pub const RANK: Self = Self {
+    pub(crate) const RANK: Self = Self {
         rounds: 2,
         derivatives: 7,
         steps_each: 4,
@@ -55,7 +55,7 @@ impl Effort {
         settled: 0.1,
     };
     /// To report.
-    pub const FINAL: Self = Self {
+    pub(crate) const FINAL: Self = Self {
         rounds: 3,
         derivatives: 20,
         steps_each: 2,
@@ -67,16 +67,16 @@ impl Effort {
 /// What fits share: the data, which samples count, how the outputs are scaled.
 #[derive(Debug, Clone)]
 pub(crate) struct Problem<'a> {
-    pub data: &'a Data,
-    pub mask: Mask,
-    pub scale: Vec<f64>,
+    pub(crate) data: &'a Data,
+    pub(crate) mask: Mask,
+    pub(crate) scale: Vec<f64>,
     /// Which noise models are tried.
-    pub colours: Colours,
+    pub(crate) colours: Colours,
 }
 
 impl<'a> Problem<'a> {
     /// All samples count.
-    pub fn new(data: &'a Data) -> Self {
+    pub(crate) fn new(data: &'a Data) -> Self {
         let mask = data
             .outputs_as_series()
             .map(|y| vec![true; y.len()])
@@ -90,12 +90,12 @@ impl<'a> Problem<'a> {
     }
 
     /// Values that count.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.mask.iter().flatten().filter(|keep| **keep).count()
     }
 
     /// Root mean square of a simulated change, in standard deviations of the outputs.
-    pub fn size(&self, change: &Series) -> f64 {
+    pub(crate) fn size(&self, change: &Series) -> f64 {
         let (mut sum, mut n) = (0.0, 0usize);
         for (s, change) in change.iter().enumerate() {
             sum += sum_of_squares(change) / self.scale[s % self.scale.len()].powi(2);
@@ -105,7 +105,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Mean square of a residual over the values that count, in variances of the outputs.
-    pub fn mean_square(&self, residual: &Series) -> f64 {
+    pub(crate) fn mean_square(&self, residual: &Series) -> f64 {
         let (mut sum, mut n) = (0.0, 0usize);
         for (s, (residual, mask)) in residual.iter().zip(&self.mask).enumerate() {
             let scale = self.scale[s % self.scale.len()];
@@ -118,7 +118,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Noise model of a residual.
-    pub fn noise(&self, residual: &Series) -> Noise {
+    pub(crate) fn noise(&self, residual: &Series) -> Noise {
         Noise::estimate(residual, self.data.outputs, &self.mask, self.colours)
     }
 }
@@ -126,33 +126,33 @@ impl<'a> Problem<'a> {
 /// A structure with its best numbers.
 #[derive(Debug, Clone)]
 pub(crate) struct Fit {
-    pub structure: Structure,
-    pub theta: Vec<f64>,
-    pub noise: Noise,
+    pub(crate) structure: Structure,
+    pub(crate) theta: Vec<f64>,
+    pub(crate) noise: Noise,
     /// `-2 log` likelihood under its own noise model.
-    pub deviance: f64,
+    pub(crate) deviance: f64,
     /// Free numbers of the structure and its noise model.
-    pub free: usize,
-    pub simulated: Series,
-    pub residual: Series,
-    pub steps: Vec<f64>,
+    pub(crate) free: usize,
+    pub(crate) simulated: Series,
+    pub(crate) residual: Series,
+    pub(crate) steps: Vec<f64>,
 }
 
 impl Fit {
     /// Schwarz's criterion: smaller is better.
-    pub fn criterion(&self, count: usize) -> f64 {
+    pub(crate) fn criterion(&self, count: usize) -> f64 {
         self.deviance + (self.free as f64) * (count.max(2) as f64).ln()
     }
 
     /// Becomes `other` if that has the lesser criterion.
-    pub fn better_of(&mut self, other: Self, count: usize) {
+    pub(crate) fn better_of(&mut self, other: Self, count: usize) {
         if other.criterion(count) < self.criterion(count) {
             *self = other;
         }
     }
 
     /// Simulates the structure at `theta` and takes its noise model, without any fitting.
-    pub fn at(problem: &Problem, structure: Structure, theta: Vec<f64>) -> Option<Self> {
+    pub(crate) fn at(problem: &Problem, structure: Structure, theta: Vec<f64>) -> Option<Self> {
         let simulated = structure.simulate(&theta, problem.data)?;
         let residual = problem.data.residual(&simulated);
         let noise = problem.noise(&residual);
@@ -184,7 +184,7 @@ impl Fit {
 
     /// Fits all free numbers from `theta` on. `start` is the noise model of the first round; without it that of the
     /// residual at the start, white.
-    pub fn run(
+    pub(crate) fn run(
         problem: &Problem,
         structure: Structure,
         theta: Vec<f64>,
@@ -201,7 +201,7 @@ impl Fit {
     }
 
     /// The fit of all free numbers that begins with those of this one, and with its noise model.
-    pub fn improved(&self, problem: &Problem, effort: Effort) -> Option<Self> {
+    pub(crate) fn improved(&self, problem: &Problem, effort: Effort) -> Option<Self> {
         let mut fit = self.clone();
         let rounds = if fit.theta.is_empty() {
             1

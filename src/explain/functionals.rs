@@ -9,13 +9,13 @@ use super::structure::Signal;
 /// Rows of a position, its rate, and what inputs add to the rate directly.
 #[derive(Debug, Clone)]
 pub(crate) struct SignalRows {
-    pub position: Vec<f64>,
+    pub(crate) position: Vec<f64>,
     /// What inputs add to the position directly: the level of an output, where the last input is one.
-    pub position_feedthrough: Vec<f64>,
-    pub rate: Vec<f64>,
-    pub rate_feedthrough: Vec<f64>,
+    pub(crate) position_feedthrough: Vec<f64>,
+    pub(crate) rate: Vec<f64>,
+    pub(crate) rate_feedthrough: Vec<f64>,
     /// What tells whether a push through a direction goes forward: the position that it holds, or the speed that it gives.
-    pub forward: Vec<f64>,
+    pub(crate) forward: Vec<f64>,
 }
 
 /// All rows that a plant's signals can be read with.
@@ -29,7 +29,7 @@ pub(crate) struct Functionals {
 }
 
 impl Functionals {
-    pub fn new(plant: &Plant) -> Self {
+    pub(crate) fn new(plant: &Plant) -> Self {
         Self {
             derivatives: Derivatives::new(plant),
             held: OnceLock::new(),
@@ -39,7 +39,7 @@ impl Functionals {
 
     /// Whether the output's integral can be read off the state of `plant`, whose rows these are: it must be a derivative, with
     /// no static gain.
-    pub fn integrates(&self, plant: &Plant, output: usize) -> bool {
+    pub(crate) fn integrates(&self, plant: &Plant, output: usize) -> bool {
         self.integrating.get_or_init(|| self.integrating(plant))[output]
     }
 
@@ -67,7 +67,7 @@ impl Functionals {
 
     /// Whether a position can be what `signal` says: an output without static gain is a speed, and positions are its
     /// integral.
-    pub fn sensible(&self, plant: &Plant, signal: Signal) -> bool {
+    pub(crate) fn sensible(&self, plant: &Plant, signal: Signal) -> bool {
         match signal {
             Signal::Output(o) => !self.integrates(plant, o),
             Signal::Integral(o) => self.integrates(plant, o),
@@ -84,7 +84,7 @@ impl Functionals {
         })
     }
 
-    pub fn of(&self, plant: &Plant, signal: Signal) -> SignalRows {
+    pub(crate) fn of(&self, plant: &Plant, signal: Signal) -> SignalRows {
         let d = &self.derivatives;
         let minus =
             |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };

@@ -46,42 +46,42 @@ const MOSTLY_COARSE: f64 = 0.3;
 /// A rival of the answer.
 #[derive(Debug, Clone)]
 pub(crate) struct Rival {
-    pub definition: &'static Definition,
+    pub(crate) definition: &'static Definition,
     /// How much better (in the criterion) than the best boring explanation.
-    pub gain: f64,
+    pub(crate) gain: f64,
 }
 
 /// All that was found.
 #[derive(Debug, Clone)]
 pub(crate) struct Finding {
-    pub verdict: Verdict,
-    pub boring: Boring,
+    pub(crate) verdict: Verdict,
+    pub(crate) boring: Boring,
     /// The model that stands: boring or augmented.
-    pub model: Fit,
+    pub(crate) model: Fit,
     /// Best augmented model, named or not.
-    pub augmented: Option<Fit>,
+    pub(crate) augmented: Option<Fit>,
     /// How much better it is than the best boring explanation.
-    pub gain: f64,
+    pub(crate) gain: f64,
     /// Others, best first.
-    pub rivals: Vec<Rival>,
+    pub(crate) rivals: Vec<Rival>,
     /// What was wrong with the data before anything was looked for in them.
-    pub troubles: Vec<Trouble>,
-    pub freezes: Vec<Freeze>,
+    pub(crate) troubles: Vec<Trouble>,
+    pub(crate) freezes: Vec<Freeze>,
     /// Output and step of a coarse sensor.
-    pub coarse: Option<(usize, f64)>,
-    pub adequacy: Option<Adequacy>,
-    pub count: usize,
+    pub(crate) coarse: Option<(usize, f64)>,
+    pub(crate) adequacy: Option<Adequacy>,
+    pub(crate) count: usize,
     /// Samples that were set aside before anything was looked at.
-    pub heldout: Mask,
+    pub(crate) heldout: Mask,
     /// What effects that were not found would have had to be: size in the output over its standard deviation.
-    pub detectable: Vec<(&'static Definition, super::structure::Instance, f64)>,
+    pub(crate) detectable: Vec<(&'static Definition, super::structure::Instance, f64)>,
     /// What was decided by the averaged equation of motion.
-    pub weak: Option<Box<super::weak::Proof>>,
+    pub(crate) weak: Option<Box<super::weak::Proof>>,
 }
 
 impl Finding {
     /// Adds what was wrong with the data: where nothing else is missing, it is the answer.
-    pub fn add(&mut self, troubles: Vec<Trouble>) {
+    pub(crate) fn add(&mut self, troubles: Vec<Trouble>) {
         if troubles.iter().any(|t| t.kind.id().is_some())
             && matches!(self.verdict, Verdict::Consistent | Verdict::Parameters)
         {
@@ -97,7 +97,7 @@ impl Finding {
     /// Root mean square free-run error of each half of `data` when the numbers of the model that stands are fitted to the
     /// other, over the standard deviation of what was recorded, where `mask` counts; `None` where a half does not determine
     /// them. Of drives: one output.
-    pub fn error_across_halves(&self, data: &Data, mask: &Mask) -> Option<f64> {
+    pub(crate) fn error_across_halves(&self, data: &Data, mask: &Mask) -> Option<f64> {
         let problem = Problem {
             mask: mask.clone(),
             ..Problem::new(data)

@@ -39,7 +39,7 @@ mod coordinates;
 mod curve;
 mod data;
 mod doubt;
-pub mod effects;
+pub(crate) mod effects;
 mod engine;
 mod error;
 mod explanation;

@@ -7,18 +7,18 @@ use crate::model::StateSpace;
 /// `x+ = A x + B u`, `y = C x + D u`; row-major.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Plant {
-    pub states: usize,
-    pub inputs: usize,
-    pub outputs: usize,
-    pub a: Vec<f64>,
-    pub b: Vec<f64>,
-    pub c: Vec<f64>,
-    pub d: Vec<f64>,
-    pub sample_time: f64,
+    pub(crate) states: usize,
+    pub(crate) inputs: usize,
+    pub(crate) outputs: usize,
+    pub(crate) a: Vec<f64>,
+    pub(crate) b: Vec<f64>,
+    pub(crate) c: Vec<f64>,
+    pub(crate) d: Vec<f64>,
+    pub(crate) sample_time: f64,
 }
 
 impl Plant {
-    pub fn from_state_space(system: &StateSpace) -> Self {
+    pub(crate) fn from_state_space(system: &StateSpace) -> Self {
         Self {
             states: system.states(),
             inputs: system.inputs(),
@@ -31,34 +31,34 @@ impl Plant {
         }
     }
 
-    pub fn a_matrix(&self) -> DMatrix<f64> {
+    pub(crate) fn a_matrix(&self) -> DMatrix<f64> {
         DMatrix::from_row_slice(self.states, self.states, &self.a)
     }
 
-    pub fn b_matrix(&self) -> DMatrix<f64> {
+    pub(crate) fn b_matrix(&self) -> DMatrix<f64> {
         DMatrix::from_row_slice(self.states, self.inputs, &self.b)
     }
 
-    pub fn c_matrix(&self) -> DMatrix<f64> {
+    pub(crate) fn c_matrix(&self) -> DMatrix<f64> {
         DMatrix::from_row_slice(self.outputs, self.states, &self.c)
     }
 
-    pub fn d_matrix(&self) -> DMatrix<f64> {
+    pub(crate) fn d_matrix(&self) -> DMatrix<f64> {
         DMatrix::from_row_slice(self.outputs, self.inputs, &self.d)
     }
 
     /// Row `output` of `C`.
-    pub fn c_row(&self, output: usize) -> &[f64] {
+    pub(crate) fn c_row(&self, output: usize) -> &[f64] {
         &self.c[output * self.states..(output + 1) * self.states]
     }
 
     /// Row `output` of `D`.
-    pub fn d_row(&self, output: usize) -> &[f64] {
+    pub(crate) fn d_row(&self, output: usize) -> &[f64] {
         &self.d[output * self.inputs..(output + 1) * self.inputs]
     }
 
     /// Column `input` of `B`.
-    pub fn b_column(&self, input: usize) -> Vec<f64> {
+    pub(crate) fn b_column(&self, input: usize) -> Vec<f64> {
         (0..self.states)
             .map(|i| self.b[i * self.inputs + input])
             .collect()
@@ -66,7 +66,7 @@ impl Plant {
 
     /// Takes up a force `-(row x + feedthrough u)` that enters through `direction`, with the mean of its values at both
     /// ends of a sample interval; without `feedthrough` it is zero.
-    pub fn add_linear_force(&mut self, direction: &[f64], row: &[f64], feedthrough: &[f64]) {
+    pub(crate) fn add_linear_force(&mut self, direction: &[f64], row: &[f64], feedthrough: &[f64]) {
         let (n, r) = (self.states, self.inputs);
         // Half of `row (x + A x + B u)`.
         let after = |matrix: &[f64], columns: usize, column: usize| -> f64 {
@@ -89,7 +89,7 @@ impl Plant {
     }
 
     /// The same input-output behaviour in the state `T x`.
-    pub fn transformed(&self, t: &DMatrix<f64>, t_inverse: &DMatrix<f64>) -> Self {
+    pub(crate) fn transformed(&self, t: &DMatrix<f64>, t_inverse: &DMatrix<f64>) -> Self {
         Self {
             a: row_major(&(t * self.a_matrix() * t_inverse)),
             b: row_major(&(t * self.b_matrix())),

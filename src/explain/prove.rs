@@ -158,11 +158,11 @@ pub(crate) fn figure(data: &Data, residual: &Series, mask: &Mask, output: usize)
 
 /// Residuals of the four steps.
 pub(crate) struct Steps<'a> {
-    pub simulation: &'a Series,
-    pub parameters_only: &'a Series,
-    pub augmented: &'a Series,
+    pub(crate) simulation: &'a Series,
+    pub(crate) parameters_only: &'a Series,
+    pub(crate) augmented: &'a Series,
     /// Share of the augmented residual's variance that is structure, not noise.
-    pub structure_share: f64,
+    pub(crate) structure_share: f64,
 }
 
 /// The table row for the samples of `mask`.

@@ -12,9 +12,9 @@ use super::structure::Structure;
 /// A law that grows out of a simpler one which fits already: `(id, variant)` of both, and what its further numbers
 /// start from.
 pub(crate) struct Refinement {
-    pub simple: (&'static str, &'static str),
-    pub rich: (&'static str, &'static str),
-    pub more: More,
+    pub(crate) simple: (&'static str, &'static str),
+    pub(crate) rich: (&'static str, &'static str),
+    pub(crate) more: More,
 }
 
 pub(crate) enum More {

@@ -13,14 +13,14 @@ const DIVERGED: f64 = 1e60;
 /// How finely the recursion runs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Grid {
-    pub samples: usize,
+    pub(crate) samples: usize,
     /// Steps of the plant in a sample interval, over which the inputs are held.
-    pub steps: usize,
+    pub(crate) steps: usize,
 }
 
 impl Grid {
     /// One step a sample.
-    pub fn of_samples(samples: usize) -> Self {
+    pub(crate) fn of_samples(samples: usize) -> Self {
         Self { samples, steps: 1 }
     }
 }
@@ -28,15 +28,15 @@ impl Grid {
 /// A force made ready for one parameter vector.
 #[derive(Debug, Clone)]
 pub(crate) struct ActiveForce {
-    pub law: ForceLaw,
-    pub parameters: Vec<f64>,
-    pub position: Vec<f64>,
-    pub position_feedthrough: Vec<f64>,
-    pub rate: Vec<f64>,
-    pub rate_feedthrough: Vec<f64>,
-    pub direction: Vec<f64>,
-    pub rate_gain: f64,
-    pub input: usize,
+    pub(crate) law: ForceLaw,
+    pub(crate) parameters: Vec<f64>,
+    pub(crate) position: Vec<f64>,
+    pub(crate) position_feedthrough: Vec<f64>,
+    pub(crate) rate: Vec<f64>,
+    pub(crate) rate_feedthrough: Vec<f64>,
+    pub(crate) direction: Vec<f64>,
+    pub(crate) rate_gain: f64,
+    pub(crate) input: usize,
 }
 
 /// Outputs of `plant`, whose step is that of `grid` and of `clock`, at the samples, under `inputs` and `forces` from the

@@ -23,44 +23,44 @@ const LINES: usize = 4;
 /// An effect at a place with starting values, and what one step promises.
 #[derive(Debug, Clone)]
 pub(crate) struct Lead {
-    pub instance: Instance,
+    pub(crate) instance: Instance,
     /// Its numbers, in the order and scale of the parameter vector.
-    pub start: Vec<f64>,
+    pub(crate) start: Vec<f64>,
     /// Predicted decrease of Schwarz's criterion.
-    pub gain: f64,
+    pub(crate) gain: f64,
 }
 
 /// Everything that screening around one fit needs.
 pub(crate) struct Bench<'a> {
-    pub problem: &'a Problem<'a>,
-    pub basis: &'a Fit,
-    pub plant: Plant,
-    pub rows: Functionals,
-    pub noise: &'a Noise,
+    pub(crate) problem: &'a Problem<'a>,
+    pub(crate) basis: &'a Fit,
+    pub(crate) plant: Plant,
+    pub(crate) rows: Functionals,
+    pub(crate) noise: &'a Noise,
     /// Square roots of the weights of the values that count.
-    pub weights: Vec<f64>,
+    pub(crate) weights: Vec<f64>,
     /// Whitened weighted residual, projected off the free numbers.
-    pub residual: DVector<f64>,
+    pub(crate) residual: DVector<f64>,
     /// Whitened weighted sensitivities, and the inverse of their Gram matrix.
-    pub nuisance: DMatrix<f64>,
-    pub nuisance_inverse: DMatrix<f64>,
-    pub left: f64,
+    pub(crate) nuisance: DMatrix<f64>,
+    pub(crate) nuisance_inverse: DMatrix<f64>,
+    pub(crate) left: f64,
     /// What a small change before the sensors is multiplied by, where they do not pass it on as it is.
-    pub slopes: Option<Series>,
+    pub(crate) slopes: Option<Series>,
 }
 
 /// A place and law with its response: one column a linear coefficient.
 pub(crate) struct Template {
-    pub instance: Instance,
-    pub shape: Vec<f64>,
-    pub columns: Vec<Series>,
+    pub(crate) instance: Instance,
+    pub(crate) shape: Vec<f64>,
+    pub(crate) columns: Vec<Series>,
 }
 
 /// Signals of the basis: per segment.
 pub(crate) struct Signals {
-    pub instance_signal: Signal,
-    pub position: Vec<Vec<f64>>,
-    pub rate: Vec<Vec<f64>>,
+    pub(crate) instance_signal: Signal,
+    pub(crate) position: Vec<Vec<f64>>,
+    pub(crate) rate: Vec<Vec<f64>>,
 }
 
 /// Screens the library (entries that `allowed` lets pass) around `basis` under each of `noises`: a list each, best
@@ -106,7 +106,7 @@ pub(crate) fn screen(
 }
 
 impl<'a> Bench<'a> {
-    pub fn new(
+    pub(crate) fn new(
         problem: &'a Problem<'a>,
         basis: &'a Fit,
         noise: &'a Noise,
@@ -162,12 +162,12 @@ impl<'a> Bench<'a> {
         (bench.left > 0.0).then_some(bench)
     }
 
-    pub fn data(&self) -> &Data {
+    pub(crate) fn data(&self) -> &Data {
         self.problem.data
     }
 
     /// Whitened, weighted, without the values that do not count.
-    pub fn flatten(&self, series: &Series) -> Vec<f64> {
+    pub(crate) fn flatten(&self, series: &Series) -> Vec<f64> {
         let mut flat = self.noise.whiten_kept(series, &self.problem.mask);
         for (v, w) in flat.iter_mut().zip(&self.weights) {
             *v *= w;
@@ -176,7 +176,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Columns less what the free numbers of the plant explain of them.
-    pub fn projected(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(crate) fn projected(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         if self.nuisance.ncols() == 0 {
             return columns.clone();
         }
@@ -185,12 +185,12 @@ impl<'a> Bench<'a> {
         columns - crate::linalg::multiply(&self.nuisance, &coefficients)
     }
 
-    pub fn clock(&self, segment: usize) -> Clock {
+    pub(crate) fn clock(&self, segment: usize) -> Clock {
         clock(self.data(), segment)
     }
 
     /// Positions and rates that forces may look at, from the motion of the basis.
-    pub fn signals(&self) -> Vec<Signals> {
+    pub(crate) fn signals(&self) -> Vec<Signals> {
         motions(self.problem, self.basis, &self.plant)
     }
 

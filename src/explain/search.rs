@@ -29,19 +29,19 @@ const PROMISING_SECONDS: usize = 4;
 #[derive(Debug, Clone)]
 pub(crate) struct Boring {
     /// The simulation as it was given.
-    pub given: Fit,
+    pub(crate) given: Fit,
     /// With other initial states, if the criterion allows.
-    pub strict: Fit,
+    pub(crate) strict: Fit,
     /// The plant as given, with what the criterion allows of other initial states, gains, stiffness and damping.
-    pub near: Fit,
+    pub(crate) near: Fit,
     /// With other parameters and initial states.
-    pub full: Fit,
+    pub(crate) full: Fit,
 }
 
 impl Boring {
     /// All of them around `structure`, the simulation as it is known; `refit` is another plant from which its parameters may
     /// be fitted as well.
-    pub fn fit(
+    pub(crate) fn fit(
         problem: &Problem,
         structure: &Structure,
         refit: Option<&Structure>,
@@ -100,7 +100,7 @@ impl Boring {
     }
 
     /// The one with the least criterion.
-    pub fn best(&self, count: usize) -> &Fit {
+    pub(crate) fn best(&self, count: usize) -> &Fit {
         if self.full.criterion(count) < self.near.criterion(count) {
             &self.full
         } else {
@@ -214,12 +214,12 @@ fn adjustments(problem: &Problem, structure: &Structure) -> Vec<Vec<Instance>> {
 /// One fitted explanation.
 #[derive(Debug, Clone)]
 pub(crate) struct Ranked {
-    pub fit: Fit,
-    pub criterion: f64,
+    pub(crate) fit: Fit,
+    pub(crate) criterion: f64,
 }
 
 impl Ranked {
-    pub fn new(problem: &Problem, fit: Fit) -> Self {
+    pub(crate) fn new(problem: &Problem, fit: Fit) -> Self {
         Self {
             criterion: fit.criterion(problem.count()),
             fit,

@@ -200,9 +200,9 @@ pub(crate) fn validated_gain(problem: &Problem, a: &Fit, b: &Fit) -> Option<Vali
 
 /// What blocks of the fitted part say of a gain when they are left out of the fit.
 pub(crate) struct Validated {
-    pub gain: f64,
+    pub(crate) gain: f64,
     /// Their share of the fitted values.
-    pub share: f64,
+    pub(crate) share: f64,
 }
 
 /// Effects of one kind, of which a recording hardly holds two: misfit of the one would be called the other.

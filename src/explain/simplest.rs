@@ -29,9 +29,9 @@ const MOST_DECIMALS: i32 = 12;
 
 /// A simulator, and the level of each output that it is linear about.
 pub(crate) struct Simplest {
-    pub plant: Plant,
-    pub initial: Vec<Vec<f64>>,
-    pub level: Option<Vec<f64>>,
+    pub(crate) plant: Plant,
+    pub(crate) initial: Vec<Vec<f64>>,
+    pub(crate) level: Option<Vec<f64>>,
 }
 
 /// The simplest linear system that reproduces `data` (noise-free outputs) to their digits; `None` where none does.

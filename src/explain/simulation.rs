@@ -33,17 +33,17 @@ pub enum Simulation {
 /// The simulation as the engine knows it, beside the data in the form that it is compared with.
 #[derive(Debug, Clone)]
 pub(crate) struct Known {
-    pub data: Data,
+    pub(crate) data: Data,
     /// Plant and effects that the simulation holds, all numbers fixed.
-    pub structure: Structure,
+    pub(crate) structure: Structure,
     /// Delay of each input in samples, applied to `data` already.
-    pub delays: Vec<usize>,
+    pub(crate) delays: Vec<usize>,
     /// The simulator is not linear and known by its outputs only: `data` is relative to what `structure` misses.
-    pub relative: bool,
+    pub(crate) relative: bool,
     /// The simulation is a model that was identified from a recording.
-    pub identified: bool,
+    pub(crate) identified: bool,
     /// How well it is known, if it says so.
-    pub uncertainty: Option<Uncertainty>,
+    pub(crate) uncertainty: Option<Uncertainty>,
 }
 
 /// Samples that a state needs, so that blocks can be held out.

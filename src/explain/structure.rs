@@ -43,18 +43,18 @@ pub(crate) enum Direction {
 /// One effect at one place.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Instance {
-    pub definition: &'static Definition,
+    pub(crate) definition: &'static Definition,
     /// Input or output index, for effects on channels and paths.
-    pub channel: usize,
+    pub(crate) channel: usize,
     /// What a force looks at.
-    pub signal: Signal,
+    pub(crate) signal: Signal,
     /// How a force enters.
-    pub direction: Direction,
+    pub(crate) direction: Direction,
 }
 
 impl Instance {
     /// Whether it is the same effect at the same place.
-    pub fn is_same(&self, other: &Self) -> bool {
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
         std::ptr::eq(self.definition, other.definition)
             && self.channel == other.channel
             && self.signal == other.signal
@@ -62,7 +62,7 @@ impl Instance {
     }
 
     /// Numbers before the shape parameters: amplitude or direction of a force.
-    pub fn amplitudes(&self, states: usize) -> usize {
+    pub(crate) fn amplitudes(&self, states: usize) -> usize {
         match self.direction {
             _ if !self.definition.action.is_force() => 0,
             Direction::Matched(_) => 1,
@@ -72,7 +72,7 @@ impl Instance {
 
     /// Numbers after the shape parameters: residues of a mode, cosine and sine parts at the outputs, the column of a
     /// missing path and the levels it brings, coefficients of a curve of a charge.
-    pub fn coefficients(&self, states: usize, outputs: usize) -> usize {
+    pub(crate) fn coefficients(&self, states: usize, outputs: usize) -> usize {
         match self.definition.action {
             Action::Mode | Action::Sine => 2 * outputs,
             Action::Charge => CHARGE_ORDERS * outputs,
@@ -82,7 +82,7 @@ impl Instance {
     }
 
     /// All its numbers.
-    pub fn len(&self, states: usize, outputs: usize) -> usize {
+    pub(crate) fn len(&self, states: usize, outputs: usize) -> usize {
         self.amplitudes(states)
             + self.definition.parameters.len()
             + self.coefficients(states, outputs)
@@ -92,38 +92,38 @@ impl Instance {
 /// Which numbers are free.
 #[derive(Debug, Clone)]
 pub(crate) struct Structure {
-    pub coordinates: Arc<Coordinates>,
+    pub(crate) coordinates: Arc<Coordinates>,
     /// The plant's numbers are free; else those of the simulation.
-    pub plant_free: bool,
+    pub(crate) plant_free: bool,
     /// The initial states are free; else they are `initial`.
-    pub initial_free: bool,
+    pub(crate) initial_free: bool,
     /// Initial state of each segment while it is not free.
-    pub initial: Vec<Vec<f64>>,
+    pub(crate) initial: Vec<Vec<f64>>,
     /// The direct feedthrough is free (it then is of the plant's numbers, so the plant must be free too).
-    pub feedthrough_free: bool,
+    pub(crate) feedthrough_free: bool,
     /// Steps of the recursion in a sample interval, more than one where a law decides within it (see `finer`).
-    pub substeps: usize,
+    pub(crate) substeps: usize,
     /// The new effects act in this recording only; else in all.
-    pub recording: Option<usize>,
+    pub(crate) recording: Option<usize>,
     /// All effects; the first `known.len()` of them are in the simulation already.
-    pub effects: Vec<Instance>,
+    pub(crate) effects: Vec<Instance>,
     /// Numbers of the effects that the simulation knows; they are free when the plant is.
-    pub known: Vec<Vec<f64>>,
+    pub(crate) known: Vec<Vec<f64>>,
     /// So many effects after those are adjustments of a number (`effects::linear`), not new physics.
-    pub adjusted: usize,
+    pub(crate) adjusted: usize,
 }
 
 impl Structure {
-    pub fn states(&self) -> usize {
+    pub(crate) fn states(&self) -> usize {
         self.coordinates.given.states
     }
 
-    pub fn outputs(&self) -> usize {
+    pub(crate) fn outputs(&self) -> usize {
         self.coordinates.given.outputs
     }
 
     /// Numbers before those of the effects.
-    pub fn linear_len(&self) -> usize {
+    pub(crate) fn linear_len(&self) -> usize {
         (if self.plant_free {
             self.coordinates.len()
         } else {
@@ -145,17 +145,17 @@ impl Structure {
     }
 
     /// Index of the first effect that is new physics.
-    pub fn first_new(&self) -> usize {
+    pub(crate) fn first_new(&self) -> usize {
         self.known.len() + self.adjusted
     }
 
     /// The effects that are new physics.
-    pub fn new_effects(&self) -> &[Instance] {
+    pub(crate) fn new_effects(&self) -> &[Instance] {
         &self.effects[self.first_new()..]
     }
 
     /// The same without new effects, whose numbers are the last ones.
-    pub fn without_new(&self) -> Self {
+    pub(crate) fn without_new(&self) -> Self {
         let mut structure = self.clone();
         structure.effects.truncate(self.first_new());
         structure.recording = None;
@@ -163,7 +163,7 @@ impl Structure {
     }
 
     /// Whether the plant is tanks: the linear plant is then only what they do near their mean levels.
-    pub fn is_tanks(&self) -> bool {
+    pub(crate) fn is_tanks(&self) -> bool {
         self.effects
             .iter()
             .any(|e| matches!(e.definition.action, Action::Process))
@@ -174,17 +174,17 @@ impl Structure {
         (if self.plant_free { 0 } else { self.known.len() })..self.effects.len()
     }
 
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.effect_offset(self.effects.len())
     }
 
     /// Numbers that are fitted.
-    pub fn free_len(&self) -> usize {
+    pub(crate) fn free_len(&self) -> usize {
         self.held().iter().filter(|held| !**held).count()
     }
 
     /// Which numbers stay where they are: where a curve is looked at, and the amplitude beside its coefficients.
-    pub fn held(&self) -> Vec<bool> {
+    pub(crate) fn held(&self) -> Vec<bool> {
         let mut held = vec![false; self.linear_len()];
         for effect in &self.effects[self.free_effects()] {
             let amplitudes = effect.amplitudes(self.states());
@@ -200,7 +200,7 @@ impl Structure {
     }
 
     /// Where the numbers of effect `index` begin (those of known effects have no place while they are fixed).
-    pub fn effect_offset(&self, index: usize) -> usize {
+    pub(crate) fn effect_offset(&self, index: usize) -> usize {
         self.linear_len()
             + self.effects[self.free_effects().start.min(index)..index]
                 .iter()
@@ -209,14 +209,14 @@ impl Structure {
     }
 
     /// Place of the time at which effect `index` begins, if it has one.
-    pub fn change_time(&self, index: usize) -> Option<usize> {
+    pub(crate) fn change_time(&self, index: usize) -> Option<usize> {
         let effect = &self.effects[index];
         let at = effect.definition.change_time()?;
         Some(self.effect_offset(index) + effect.amplitudes(self.states()) + at)
     }
 
     /// The numbers of effect `index`.
-    pub fn effect_numbers<'a>(&'a self, theta: &'a [f64], index: usize) -> &'a [f64] {
+    pub(crate) fn effect_numbers<'a>(&'a self, theta: &'a [f64], index: usize) -> &'a [f64] {
         if !self.plant_free && index < self.known.len() {
             return &self.known[index];
         }
@@ -225,7 +225,7 @@ impl Structure {
     }
 
     /// The linear numbers, and those of the known effects, as they were given; nothing is adjusted.
-    pub fn given(&self) -> Vec<f64> {
+    pub(crate) fn given(&self) -> Vec<f64> {
         let mut theta = self.given_linear();
         if self.plant_free {
             theta.extend(self.known.iter().flatten());
@@ -259,7 +259,7 @@ impl Structure {
     }
 
     /// Bounds of each number, on the scale it is held in.
-    pub fn bounds(&self) -> Vec<(f64, f64)> {
+    pub(crate) fn bounds(&self) -> Vec<(f64, f64)> {
         let open = (f64::NEG_INFINITY, f64::INFINITY);
         let mut bounds = vec![open; self.linear_len()];
         for effect in &self.effects[self.free_effects()] {
@@ -289,7 +289,7 @@ impl Structure {
     }
 
     /// The plant that these numbers stand for.
-    pub fn plant(&self, theta: &[f64]) -> Plant {
+    pub(crate) fn plant(&self, theta: &[f64]) -> Plant {
         if self.plant_free {
             let mut plant = self.coordinates.plant(&theta[..self.coordinates.len()]);
             let count = self.feedthrough_len();
@@ -314,7 +314,7 @@ impl Structure {
     }
 
     /// Initial state of segment `index`.
-    pub fn initial_state<'a>(&'a self, theta: &'a [f64], index: usize) -> &'a [f64] {
+    pub(crate) fn initial_state<'a>(&'a self, theta: &'a [f64], index: usize) -> &'a [f64] {
         let n = self.states();
         if self.initial_free {
             let from = (if self.plant_free {
@@ -329,7 +329,7 @@ impl Structure {
     }
 
     /// Shape parameters of effect `index` in physical units.
-    pub fn shape(&self, theta: &[f64], index: usize) -> Vec<f64> {
+    pub(crate) fn shape(&self, theta: &[f64], index: usize) -> Vec<f64> {
         let effect = &self.effects[index];
         let numbers = &self.effect_numbers(theta, index)[effect.amplitudes(self.states())..];
         effect
@@ -342,7 +342,7 @@ impl Structure {
     }
 
     /// Direction through which force `index` enters, amplitude included (`n`).
-    pub fn direction(
+    pub(crate) fn direction(
         &self,
         theta: &[f64],
         plant: &Plant,
@@ -368,7 +368,7 @@ impl Structure {
     }
 
     /// Simulated outputs of all segments; `None` when they leave any sensible range.
-    pub fn simulate(&self, theta: &[f64], data: &Data) -> Option<Series> {
+    pub(crate) fn simulate(&self, theta: &[f64], data: &Data) -> Option<Series> {
         let prepared = self.prepare(theta);
         let elsewhere = self.recording.map(|_| self.without_new());
         let elsewhere =
@@ -393,7 +393,7 @@ impl Structure {
     }
 
     /// Outputs on a new input from the initial state `x0`.
-    pub fn simulate_fresh(
+    pub(crate) fn simulate_fresh(
         &self,
         theta: &[f64],
         segment: &Segment,
@@ -409,7 +409,7 @@ impl Structure {
     }
 
     /// What all segments share.
-    pub fn prepare(&self, theta: &[f64]) -> Prepared {
+    pub(crate) fn prepare(&self, theta: &[f64]) -> Prepared {
         let mut plant = self.plant(theta);
         let mut forces = Vec::new();
         let mut own_rows: Option<Functionals> = None;
@@ -460,7 +460,7 @@ impl Structure {
 
     /// Inputs as the plant sees them, and their moments within the intervals (all first ones, then all second ones) where a law
     /// has any.
-    pub fn effective_inputs<'a>(
+    pub(crate) fn effective_inputs<'a>(
         &self,
         theta: &[f64],
         segment: &'a Segment,
@@ -587,7 +587,7 @@ impl Structure {
 /// What all segments share at one parameter vector.
 #[derive(Debug, Clone)]
 pub(crate) struct Prepared {
-    pub plant: Plant,
-    pub forces: Vec<ActiveForce>,
+    pub(crate) plant: Plant,
+    pub(crate) forces: Vec<ActiveForce>,
     finer: Option<Finer>,
 }

@@ -38,7 +38,7 @@ pub(crate) struct Uncertainty {
 
 impl Uncertainty {
     /// `None` where the model is unstable or its covariance is of no use.
-    pub fn of(model: &Model, covariance: &ParameterCovariance) -> Option<Self> {
+    pub(crate) fn of(model: &Model, covariance: &ParameterCovariance) -> Option<Self> {
         let system = &model.system;
         let times = times(&Plant::from_state_space(system))?;
         let signals = system.inputs();
@@ -60,7 +60,7 @@ impl Uncertainty {
     }
 
     /// Probability of a larger difference between the plant of the simulation and that of `fit` when they are the same.
-    pub fn p_value(&self, problem: &Problem, fit: &Fit) -> Option<f64> {
+    pub(crate) fn p_value(&self, problem: &Problem, fit: &Fit) -> Option<f64> {
         let mut fit = fit.clone();
         let own = fit.certainty(problem)?.covariance;
         let structure = fit.structure.clone();

@@ -14,17 +14,9 @@ const SMALLEST_PAST_OF_KNUDSEN: usize = 20;
 
 /// Algorithm that estimates the system matrices.
 #[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Default,
-    Serialize,
-    Deserialize,
-    schemars::JsonSchema,
-    clap::ValueEnum,
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
 )]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// Predictor-based subspace identification, optimised (van Wingerden); the first step of the
@@ -46,7 +38,14 @@ pub enum Method {
 impl Method {
     /// Every method there is.
     pub fn all() -> &'static [Self] {
-        clap::ValueEnum::value_variants()
+        &[
+            Self::PbsidOpt,
+            Self::Knudsen,
+            Self::Pem,
+            Self::Subid,
+            Self::Whitening,
+            Self::InnovationEstimation,
+        ]
     }
 
     /// The name on the command line and in documents.
@@ -63,7 +62,7 @@ impl Method {
 
     /// Lags that the moments must hold for these windows; `future` is `None` when it is chosen later, and is at
     /// most `past` then.
-    pub fn lags(self, past: usize, future: Option<usize>) -> usize {
+    pub(crate) fn lags(self, past: usize, future: Option<usize>) -> usize {
         match self {
             Self::PbsidOpt => past,
             Self::Whitening | Self::InnovationEstimation => {
@@ -85,7 +84,7 @@ impl Method {
     }
 
     /// Future window for an order when none is asked for.
-    pub fn future(self, past: usize, outputs: usize, order: usize) -> usize {
+    pub(crate) fn future(self, past: usize, outputs: usize, order: usize) -> usize {
         match self {
             Self::PbsidOpt | Self::Whitening | Self::InnovationEstimation | Self::Pem => {
                 horizon::future_for_order(past, outputs, order)
@@ -98,7 +97,7 @@ impl Method {
     }
 
     /// Smallest past window that is chosen automatically, for the largest order that is asked for.
-    pub fn smallest_past(self, outputs: usize, order: usize) -> usize {
+    pub(crate) fn smallest_past(self, outputs: usize, order: usize) -> usize {
         match self {
             Self::PbsidOpt | Self::Whitening | Self::InnovationEstimation | Self::Pem => 1,
             Self::Knudsen => SMALLEST_PAST_OF_KNUDSEN,
@@ -108,7 +107,7 @@ impl Method {
     }
 
     /// The method that stands in while orders are compared: the prediction error method runs once, in the end.
-    pub fn for_comparing_orders(self) -> Self {
+    pub(crate) fn for_comparing_orders(self) -> Self {
         match self {
             Self::Pem => Self::PbsidOpt,
             other => other,
@@ -116,7 +115,7 @@ impl Method {
     }
 
     /// Whether the method does `--polish always` itself: its numbers are then those of its own improvement.
-    pub fn polishes_itself(self) -> bool {
+    pub(crate) fn polishes_itself(self) -> bool {
         match self {
             // One Gauss-Newton step in the time domain; the other is maximum likelihood as it is.
             Self::Knudsen | Self::Pem => true,
@@ -133,7 +132,7 @@ impl Method {
     }
 
     /// Whether the method does this stochastic step itself, with its covariance.
-    pub fn has_own(self, step: Stochastic) -> bool {
+    pub(crate) fn has_own(self, step: Stochastic) -> bool {
         self == Self::Knudsen && matches!(step, Stochastic::FirstColumn | Stochastic::Cholesky)
     }
 
@@ -150,7 +149,7 @@ impl Method {
     }
 
     /// Whether `Uncertain::propagation` has a formula, which a stochastic step of another method builds on.
-    pub fn has_propagation(self) -> bool {
+    pub(crate) fn has_propagation(self) -> bool {
         match self {
             Self::PbsidOpt | Self::Whitening | Self::InnovationEstimation => true,
             Self::Knudsen | Self::Pem | Self::Subid => false,
@@ -159,7 +158,7 @@ impl Method {
 
     /// Whether `--polish auto` polishes. Who asks for another method by name wants that method's numbers: the
     /// polished model is the same whatever method it started from.
-    pub fn polishes_by_default(self) -> bool {
+    pub(crate) fn polishes_by_default(self) -> bool {
         self == Self::PbsidOpt
     }
 
@@ -170,7 +169,7 @@ impl Method {
     /// with `G` the impulse response of the noise model, far from the identity even for one output, so the identity
     /// weight costs variance (3 times the Cramer-Rao bound in example 1 of Chiuso & Picci, 22 times in example 2 at
     /// 3 rad; with canonical variates 1.0 and 1.5 times).
-    pub fn default_weight(self, automatic: Weight) -> Weight {
+    pub(crate) fn default_weight(self, automatic: Weight) -> Weight {
         match self {
             Self::PbsidOpt | Self::Whitening => automatic,
             Self::InnovationEstimation => Weight::Cva,
@@ -181,9 +180,8 @@ impl Method {
 }
 
 /// Step that estimates `K` and `Lambda` in the place of the method's own.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema, clap::ValueEnum,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Stochastic {
     /// The gain whose one-step predictor is nearest to the vector ARX model, given A, B, C, D: maximum
@@ -198,7 +196,7 @@ pub enum Stochastic {
 impl Stochastic {
     /// Every step there is.
     pub fn all() -> &'static [Self] {
-        clap::ValueEnum::value_variants()
+        &[Self::Innovations, Self::FirstColumn, Self::Cholesky]
     }
 
     /// The name on the command line and in documents.
@@ -218,7 +216,7 @@ impl Stochastic {
         }
     }
 
-    /// Whether [`Stochastic::propagation`] has a formula.
+    /// Whether `Stochastic::propagation` has a formula.
     pub fn has_covariance(self) -> bool {
         match self {
             Self::Innovations => true,
@@ -228,7 +226,7 @@ impl Stochastic {
 
     /// Lags that the moments must hold for these windows; `future` is `None` when it is chosen later, and is at
     /// most `past` then.
-    pub fn lags(self, past: usize, future: Option<usize>) -> usize {
+    pub(crate) fn lags(self, past: usize, future: Option<usize>) -> usize {
         match self {
             Self::Innovations => past,
             Self::FirstColumn | Self::Cholesky => past.saturating_add(future.unwrap_or(past)),

@@ -58,13 +58,14 @@ const INITIAL_STATE_SAMPLES: usize = 20_000;
 /// Identifies a model from recordings in memory: several are experiments of one plant.
 ///
 /// ```
-/// use innovant::{Options, identify, systems};
+/// use innovant::log::{Log, Roles, Source};
+/// use innovant::{Options, identify};
 ///
-/// let recording = systems::van_wingerden_one().record(2000, 1); // closed loop, two inputs, two outputs
-/// let model = identify(&[recording], &Options::default())?;
+/// let log = Log::read(&Source::from("data/closed_loop.csv"), &Roles::default())?; // two inputs, two outputs
+/// let model = identify(&[log], &Options::default())?;
 /// assert_eq!(model.system.states(), 4);
 /// println!("{model}");
-/// # Ok::<(), innovant::IdentifyError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors

@@ -6,6 +6,7 @@ use crate::log::LogError;
 
 /// Failure of an identification.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum IdentifyError {
     /// The recording could not be read.
     #[error(transparent)]

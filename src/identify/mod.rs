@@ -25,44 +25,47 @@
 //! `n` states, `z = [u; y]`, `q = r + l`; past window `p`, future window `f <= p`, `Nc = N - p` windows.
 
 mod algorithms;
-pub mod baselines;
+pub(crate) mod baselines;
 mod data;
 mod fit_aligned;
-mod fit_recordings;
+pub(crate) mod fit_recordings;
 mod horizon;
 mod identified_model;
 mod identify_error;
-pub mod knudsen;
-pub mod method;
+pub(crate) mod knudsen;
+pub(crate) mod method;
 mod options;
 mod order;
-pub mod pem;
-mod polish;
+pub(crate) mod pem;
+pub(crate) mod polish;
 mod result;
 mod simulate_recording;
 mod stable;
-pub mod stochastic;
-mod subspace;
-pub mod variance;
+pub(crate) mod stochastic;
+pub(crate) mod subspace;
+pub(crate) mod variance;
 
+pub use crate::moments::{Detrend, Route};
 pub use algorithms::{Method, Stochastic};
+pub(crate) use data::AlignedColumns;
+#[cfg(feature = "cli")]
+pub(crate) use data::on_files;
 pub use data::{
-    AlignedColumns, Aligner, FileRecords, MemoryRecords, ReadProgress, Recording, Records,
-    ReducedRecords, SAMPLES_KEPT, Source, on_files,
+    FileRecords, MemoryRecords, ReadProgress, Recording, Records, ReducedRecords, SAMPLES_KEPT,
 };
-pub use fit_recordings::fit;
 pub(crate) use identified_model::channel_names;
 pub use identified_model::{IdentifiedChannel, Model, identify, identify_records};
 pub use identify_error::IdentifyError;
 pub use options::{CovarianceKind, Options, Order, Polish};
 pub use order::{FreeRunRest, OrderEvidence};
-pub use polish::{Effort, Polished, coefficient_cost, polish, predictor_coefficients};
+#[cfg(feature = "cli")]
+pub(crate) use polish::{Effort, polish, predictor_coefficients};
+#[cfg(test)]
+pub(crate) use result::Fit;
+pub(crate) use result::of_closed_loop as warnings_of_closed_loop;
 pub use result::{
-    Asked, CoarseChannel, Diagnostics, Fit, Horizons, OrderTest, PastEvidence, StabilityCost,
-    Summary, of_closed_loop as warnings_of_closed_loop,
+    Asked, CoarseChannel, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary,
 };
-pub use subspace::{
-    Decomposition, Estimate, Nested, NestedDecomposition, Prediction, Varx, Weight, WeightedSvd,
-    decompose, decompose_nested, nested_system_matrices, system_matrices, varx,
-};
-pub use variance::Propagation;
+#[cfg(feature = "cli")]
+pub(crate) use subspace::{Decomposition, Estimate, Varx, decompose, system_matrices, varx};
+pub use subspace::{Prediction, Weight};

@@ -26,7 +26,7 @@ pub enum Order {
 
 impl Order {
     /// The largest order asked for; 1 when the choice is free.
-    pub fn largest(&self) -> usize {
+    pub(crate) fn largest(&self) -> usize {
         match self {
             Self::Auto => 1,
             Self::Fixed(n) => *n,
@@ -95,7 +95,7 @@ pub struct Options {
     /// Seed of everything drawn (confidence bounds by draws).
     pub seed: u64,
     /// Most memory in bytes that this identification may take; `None` is the limit of the process
-    /// ([`memory_limit`](crate::limits::memory_limit)).
+    /// (`INNOVANT_MEMORY`, else half of what this machine has).
     #[serde(skip)]
     pub memory_limit: Option<u64>,
 }

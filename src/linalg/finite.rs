@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 const TOGETHER: usize = 256;
 
 /// Whether no entry is NaN or infinite.
-pub fn all_finite(matrix: &DMatrix<f64>) -> bool {
+pub(crate) fn all_finite(matrix: &DMatrix<f64>) -> bool {
     matrix
         .as_slice()
         .chunks(TOGETHER)

@@ -2,6 +2,7 @@
 
 /// Failure of a factorisation or of an equation solver.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LinalgError {
     /// The matrix handed to Cholesky is not positive definite to working precision.
     #[error("matrix of order {order} is not positive definite (pivot {index})")]

@@ -12,7 +12,7 @@ const MOST_ITERATIONS: usize = 40;
 /// Inverse scaling and squaring (Higham, *Functions of Matrices*, 2008, section 11.5): square roots by the
 /// product form of Denman and Beavers' iteration until the matrix is near the identity, then
 /// `log M = 2 artanh((M - I)(M + I)^-1)` by its power series.
-pub fn logarithm(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+pub(crate) fn logarithm(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = matrix.nrows();
     let identity = DMatrix::identity(n, n);
     let mut root = matrix.clone();
@@ -60,7 +60,7 @@ fn square_root(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 /// Exponential of `matrix`, by scaling, a Taylor polynomial of order 18 and squaring.
-pub fn exponential(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn exponential(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
     let norm = matrix.norm();
     let squarings = if norm > 0.5 {

@@ -41,7 +41,7 @@ pub fn discrete_lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f
 ///
 /// # Errors
 /// [`LinalgError::Singular`] when an eigenvalue lies on the unit circle to working precision.
-pub fn stabilising_observer_gain(
+pub(crate) fn stabilising_observer_gain(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,
     k: &DMatrix<f64>,

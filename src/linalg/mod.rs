@@ -25,16 +25,19 @@ mod product;
 mod riccati;
 mod rows;
 
+pub(crate) use factorisation::{
+    Svd, eigen, eigenvalues, generalised_eigenvalues, least_squares, qr_r, qr_thin,
+    reciprocal_condition_upper, solve_upper, solve_upper_right, svd_thin,
+};
 pub use factorisation::{
-    Eigen, Svd, SymmetricEigen, cholesky_upper, eigen, eigenvalues, generalised_eigenvalues,
-    least_squares, pseudo_inverse, qr_r, qr_thin, reciprocal_condition_upper, solve_upper,
-    solve_upper_right, solve_upper_transposed, spectral_radius, svd_thin, symmetric_eigen,
+    cholesky_upper, pseudo_inverse, solve_upper_transposed, spectral_radius, symmetric_eigen,
     symmetric_square_root_factor,
 };
-pub use finite::all_finite;
+pub(crate) use finite::all_finite;
 pub use linalg_error::LinalgError;
-pub use logarithm::{exponential, logarithm};
-pub use lyapunov::{discrete_lyapunov, stabilising_observer_gain};
-pub use product::{multiply, multiply_nt, multiply_tn};
-pub use riccati::{StationaryFilter, stationary_filter};
+pub(crate) use logarithm::{exponential, logarithm};
+pub use lyapunov::discrete_lyapunov;
+pub(crate) use lyapunov::stabilising_observer_gain;
+pub(crate) use product::{multiply, multiply_nt, multiply_tn};
+pub(crate) use riccati::stationary_filter;
 pub use rows::Rows;

@@ -21,17 +21,17 @@ fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
 }
 
 /// `A B`.
-pub fn multiply(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn multiply(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     product(view(a), view(b))
 }
 
 /// `A' B`.
-pub fn multiply_tn(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn multiply_tn(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     product(view(a).transpose(), view(b))
 }
 
 /// `A B'`.
-pub fn multiply_nt(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn multiply_nt(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     product(view(a), view(b).transpose())
 }
 

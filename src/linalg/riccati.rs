@@ -12,13 +12,13 @@ const CONVERGED: f64 = 1e-14;
 
 /// The stationary Kalman filter of `x+ = A x + w`, `y = C x + v` in innovation form.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StationaryFilter {
+pub(crate) struct StationaryFilter {
     /// Covariance of the error of the predicted state, `n x n`.
-    pub state_error: DMatrix<f64>,
+    pub(crate) state_error: DMatrix<f64>,
     /// Gain `K = (A P C' + S) Lambda^-1`, `n x l`.
-    pub gain: DMatrix<f64>,
+    pub(crate) gain: DMatrix<f64>,
     /// Covariance of the innovations `Lambda = C P C' + R`, `l x l`.
-    pub innovation_covariance: DMatrix<f64>,
+    pub(crate) innovation_covariance: DMatrix<f64>,
 }
 
 /// Solves `P = A P A' + Q - (A P C' + S) (C P C' + R)^-1 (A P C' + S)'` for the stabilising `P`, where
@@ -28,7 +28,7 @@ pub struct StationaryFilter {
 /// # Errors
 /// [`LinalgError::Singular`] when `R` or an iterate cannot be inverted, [`LinalgError::NoConvergence`] when there
 /// is no stabilising solution.
-pub fn stationary_filter(
+pub(crate) fn stationary_filter(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,
     q: &DMatrix<f64>,

@@ -38,30 +38,32 @@
 //! # Ok::<(), innovant::log::LogError>(())
 //! ```
 
-mod data_frame;
+pub(crate) mod data_frame;
 mod log_error;
 mod quantisation;
 mod read;
 mod reading;
 mod record;
 mod roles;
-mod sample_time;
+pub(crate) mod sample_time;
 #[cfg(test)]
 mod tests;
 mod text;
 mod time;
-mod write;
+pub(crate) mod write;
 
-pub use data_frame::{TableRoles, time_base_of};
 pub use log_error::LogError;
-pub use quantisation::spacing;
-pub use read::{
-    BLOCK_ROWS, Block, LogReader, LogSummary, check_same_channels, check_same_sampling,
-};
+pub(crate) use quantisation::spacing;
+pub(crate) use read::{BLOCK_ROWS, check_same_channels, check_same_sampling};
+pub use read::{Block, LogReader, LogSummary};
 pub use reading::Reading;
-pub use record::{LARGEST_SIZE, Log};
+pub(crate) use record::LARGEST_SIZE;
+pub use record::Log;
 pub use roles::{Missing, RoleNeed, Roles, TimeUnit};
-pub use sample_time::is_sample_time;
+pub(crate) use sample_time::is_sample_time;
 pub use text::{Channel, Source};
-pub use time::Origin;
-pub use write::{CsvWriter, write_file_atomically, write_table};
+#[cfg(feature = "cli")]
+pub(crate) use time::Origin;
+#[cfg(feature = "cli")]
+pub(crate) use write::write_file_atomically;
+pub use write::{CsvWriter, write_table};

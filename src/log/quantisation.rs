@@ -4,7 +4,7 @@
 const OFF_LATTICE: f64 = 0.02;
 
 /// Spacing of the lattice that all values of `y` lie on, if they do and if they meet few of its points.
-pub fn spacing(y: &[f64]) -> Option<f64> {
+pub(crate) fn spacing(y: &[f64]) -> Option<f64> {
     let mut levels: Vec<f64> = y.to_vec();
     levels.sort_by(f64::total_cmp);
     let (low, high) = (*levels.first()?, *levels.last()?);

@@ -58,7 +58,7 @@ fn check_memory(reader: &LogReader) -> Result<(), LogError> {
 }
 /// Channels of this size and more, or that move by less than its inverse, are neither identified nor explained: a variance
 /// of a gain between two such channels, the fourth power, is still a number (1e240).
-pub const LARGEST_SIZE: f64 = 1e60;
+pub(crate) const LARGEST_SIZE: f64 = 1e60;
 
 impl Log {
     /// Every channel's samples, inputs then outputs.
@@ -233,7 +233,7 @@ impl Log {
     ///
     /// # Errors
     /// Says what differs, `other` being the one at fault.
-    pub fn check_same_kind(&self, other: &Self) -> Result<(), LogError> {
+    pub(crate) fn check_same_kind(&self, other: &Self) -> Result<(), LogError> {
         self.check_same_channels(other)?;
         check_same_sampling(&self.name, self.sample_time, &other.name, other.sample_time)
     }
@@ -242,7 +242,7 @@ impl Log {
     ///
     /// # Errors
     /// Says what differs, `other` being the one at fault.
-    pub fn check_same_channels(&self, other: &Self) -> Result<(), LogError> {
+    pub(crate) fn check_same_channels(&self, other: &Self) -> Result<(), LogError> {
         check_same_channels(
             &self.name,
             &self.inputs,

@@ -4,6 +4,7 @@ use crate::linalg::LinalgError;
 
 /// A model that is not one, or data that do not fit it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ModelError {
     /// A matrix does not fit the others.
     #[error(

@@ -9,7 +9,7 @@ use super::trend::Trend;
 /// (the last one is shorter): when there are twice as many as wanted, neighbours are merged and the
 /// blocks to come are twice as long.
 #[derive(Debug)]
-pub struct BlockAccumulator {
+pub(crate) struct BlockAccumulator {
     channels: usize,
     lags: usize,
     target: usize,
@@ -20,7 +20,7 @@ pub struct BlockAccumulator {
 
 impl BlockAccumulator {
     /// Blocks much longer than `lags` samples; between `target` and `2 target` of them in the end.
-    pub fn new(channels: usize, lags: usize, target: usize) -> Self {
+    pub(crate) fn new(channels: usize, lags: usize, target: usize) -> Self {
         Self {
             channels,
             lags,
@@ -32,7 +32,7 @@ impl BlockAccumulator {
     }
 
     /// Appends samples, one slice a channel.
-    pub fn push(&mut self, columns: &[&[f64]]) {
+    pub(crate) fn push(&mut self, columns: &[&[f64]]) {
         let length = columns.first().map_or(0, |c| c.len());
         let mut from = 0;
         while from < length {
@@ -66,7 +66,7 @@ impl BlockAccumulator {
     }
 
     /// The blocks in order. A last block shorter than half a block joins its neighbour.
-    pub fn finish(mut self) -> Vec<LagMoments> {
+    pub(crate) fn finish(mut self) -> Vec<LagMoments> {
         let rest = self.open.moments();
         if rest.samples() > 0 {
             match self.finished.last_mut() {
@@ -80,7 +80,7 @@ impl BlockAccumulator {
 
 /// Gram matrix of the windows that *begin* in each block, so that the blocks add up to the whole.
 /// `trend` is that of the record.
-pub fn block_grams(blocks: &[LagMoments], past: usize, trend: &Trend) -> Vec<Gram> {
+pub(crate) fn block_grams(blocks: &[LagMoments], past: usize, trend: &Trend) -> Vec<Gram> {
     let mut start = 0_usize;
     blocks
         .iter()

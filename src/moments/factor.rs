@@ -28,6 +28,7 @@ pub enum Route {
 
 /// The Gram matrix cannot be factored well enough.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MomentError {
     /// Cholesky failed, or the factor is too ill-conditioned for what follows.
     #[error("lag moments are too ill-conditioned for Cholesky (reciprocal condition {0:.1e})")]
@@ -59,7 +60,7 @@ impl RFactor {
     /// Factors a Gram matrix of unscaled channels by Cholesky.
     ///
     /// # Errors
-    /// [`MomentError::IllConditioned`] asks for the panel route.
+    /// `MomentError::IllConditioned` asks for the panel route.
     pub fn from_gram(gram: &Gram, inputs: usize, scale: &[f64]) -> Result<Self, MomentError> {
         let q = scale.len();
         let order = gram.gram.nrows();

@@ -29,10 +29,10 @@ mod spectrum;
 mod trend;
 
 pub use accumulator::LagAccumulator;
-pub use blocks::{BlockAccumulator, block_grams};
-pub use factor::{MomentError, RFactor, Route};
-pub use gram::Gram;
-pub use lag_moments::LagMoments;
+pub(crate) use blocks::{BlockAccumulator, block_grams};
+pub use factor::{RFactor, Route};
+pub(crate) use gram::Gram;
+pub(crate) use lag_moments::LagMoments;
 pub use panel_qr::PanelQr;
 pub use spectrum::Excitation;
 pub(crate) use spectrum::Welch;

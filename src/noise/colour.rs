@@ -23,9 +23,9 @@ const TOGETHER: usize = 8;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Colour {
     /// `a1, a2, ...`
-    pub ar: Vec<f64>,
+    pub(crate) ar: Vec<f64>,
     /// `c1, c2, ...`
-    pub ma: Vec<f64>,
+    pub(crate) ma: Vec<f64>,
     /// The first values of a stretch: without moving average, coefficients of the values before each, newest first ...
     predictors: Vec<Start<Vec<f64>>>,
     /// ... with one, Kalman's gain.

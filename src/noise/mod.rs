@@ -21,11 +21,11 @@ const DEGREES: [f64; 6] = [3.0, 4.0, 6.0, 10.0, 20.0, f64::INFINITY];
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Noise {
     /// One an output.
-    pub colours: Vec<Colour>,
+    pub(crate) colours: Vec<Colour>,
     /// Scale of the whitened residual, one an output.
-    pub scale: Vec<f64>,
+    pub(crate) scale: Vec<f64>,
     /// Degrees of freedom of Student's t; infinite for Gaussian.
-    pub degrees: f64,
+    pub(crate) degrees: f64,
 }
 
 /// A column a recording and output (`recording * outputs + output`): residuals, simulated outputs, weights.

@@ -13,11 +13,11 @@ pub struct Span {
 
 /// A node of [`Expressions`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ExpressionId(pub(crate) u32);
+pub(crate) struct ExpressionId(pub(crate) u32);
 
 impl ExpressionId {
     /// Position in the arena.
-    pub fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         self.0 as usize
     }
 }
@@ -36,7 +36,7 @@ impl VariableId {
 /// Functions of one argument.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs)]
-pub enum Function {
+pub(crate) enum Function {
     Sin,
     Cos,
     Tan,
@@ -57,7 +57,7 @@ pub enum Function {
 /// Operators and functions of two arguments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs)]
-pub enum Binary {
+pub(crate) enum Binary {
     Add,
     Subtract,
     Multiply,
@@ -78,7 +78,7 @@ pub enum Binary {
 
 /// One node. Conditions are numbers, 1 for true and 0 for false; only comparisons, `and`, `or` and `not` give them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Node {
+pub(crate) enum Node {
     /// A literal.
     Number(f64),
     /// Time in seconds (in the unit of the recording's time axis).
@@ -115,7 +115,7 @@ pub enum Node {
 
 impl Node {
     /// The nodes that this one uses.
-    pub fn operands(&self) -> impl Iterator<Item = ExpressionId> {
+    pub(crate) fn operands(&self) -> impl Iterator<Item = ExpressionId> {
         let (a, b, c) = match *self {
             Node::Number(_) | Node::Time | Node::Variable(_) | Node::Derivative(_) => {
                 (None, None, None)
@@ -131,14 +131,14 @@ impl Node {
 
 /// An arena of nodes; the operands of a node stand before it.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Expressions {
+pub(crate) struct Expressions {
     nodes: Vec<Node>,
     spans: Vec<Span>,
 }
 
 impl Expressions {
     /// Appends a node, whose operands must be in the arena already.
-    pub fn push(&mut self, node: Node, span: Span) -> ExpressionId {
+    pub(crate) fn push(&mut self, node: Node, span: Span) -> ExpressionId {
         debug_assert!(node.operands().all(|o| o.index() < self.nodes.len()));
         self.nodes.push(node);
         self.spans.push(span);
@@ -146,27 +146,22 @@ impl Expressions {
     }
 
     /// The node.
-    pub fn node(&self, id: ExpressionId) -> Node {
+    pub(crate) fn node(&self, id: ExpressionId) -> Node {
         self.nodes[id.index()]
     }
 
     /// Where in the text the node stands.
-    pub fn span(&self, id: ExpressionId) -> Span {
+    pub(crate) fn span(&self, id: ExpressionId) -> Span {
         self.spans[id.index()]
     }
 
     /// Number of nodes.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.nodes.len()
     }
 
-    /// True when there is none.
-    pub fn is_empty(&self) -> bool {
-        self.nodes.is_empty()
-    }
-
     /// True when a node is of that kind.
-    pub fn any(&self, of_kind: impl Fn(&Node) -> bool) -> bool {
+    pub(crate) fn any(&self, of_kind: impl Fn(&Node) -> bool) -> bool {
         self.nodes.iter().any(of_kind)
     }
 

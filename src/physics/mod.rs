@@ -19,14 +19,16 @@ mod syntax;
 mod units;
 
 pub use error::{SpecError, SpecErrorKind, render_all};
-pub use expression::{Binary, ExpressionId, Expressions, Function, Node, Span, VariableId};
+pub(crate) use expression::{Binary, ExpressionId, Node};
+pub use expression::{Span, VariableId};
 pub use operating_point::{Linearisation, OperatingPlant, OperatingPoint, OperatingPointError};
 pub use simulated::{Run, RunError, Simulated, Slopes};
 pub use simulation::{
-    Direction, Excitation, Hold, LinearPlant, Lineariser, Observer, Plan, Plant, Point,
-    SimulationError, Trajectory,
+    Direction, Excitation, Hold, LinearPlant, Observer, Plan, Plant, Point, SimulationError,
+    Trajectory,
 };
 pub use spec::{Equation, ModelSpec, Unknown, Variable, VariableKind};
 pub(crate) use syntax::{Token, function_names, is_reserved, nearest, tokens};
 pub use syntax::{diagnose, parse};
-pub use units::{Unit, UnknownUnit, check_units, unit_conflicts, unknown_units};
+pub(crate) use units::unit_conflicts;
+pub use units::{Unit, UnknownUnit, check_units, unknown_units};

@@ -22,7 +22,7 @@ impl Plant {
 
 impl ModelSpec {
     /// The text with these values of parameters, all else as it was written.
-    pub fn text_with(&self, values: &[(VariableId, f64)]) -> String {
+    pub(crate) fn text_with(&self, values: &[(VariableId, f64)]) -> String {
         let mut text = self.text.clone();
         let mut changes: Vec<(usize, usize, f64)> = values
             .iter()

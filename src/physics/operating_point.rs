@@ -72,7 +72,7 @@ pub struct OperatingPlant {
 
 impl OperatingPlant {
     /// Derivatives of quantities of the linearised plant: a row for each, a column for each uncertain parameter.
-    pub fn jacobian(&self, of: impl Fn(&Linearisation) -> Vec<f64>) -> DMatrix<f64> {
+    pub(crate) fn jacobian(&self, of: impl Fn(&Linearisation) -> Vec<f64>) -> DMatrix<f64> {
         let columns: Vec<DVector<f64>> = self
             .sides
             .iter()

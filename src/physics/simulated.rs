@@ -26,6 +26,7 @@ pub type Slopes = Vec<Vec<Vec<f64>>>;
 
 /// Why there is no answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RunError {
     /// The equations cannot be simulated.
     #[error(transparent)]

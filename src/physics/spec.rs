@@ -40,11 +40,11 @@ pub struct Variable {
     /// Magnitude that is usual, where stated.
     pub nominal: Option<f64>,
     /// Value at the start: numbers and parameters only.
-    pub start: Option<ExpressionId>,
+    pub(crate) start: Option<ExpressionId>,
     /// True when the start is certain (`fixed = true`).
     pub fixed: bool,
     /// Value of a constant or parameter: numbers and other parameters only.
-    pub value: Option<ExpressionId>,
+    pub(crate) value: Option<ExpressionId>,
     /// What that value is, where parameters have the values of the text.
     pub number: Option<f64>,
     /// Where it is declared: the name.
@@ -84,15 +84,15 @@ impl Unknown {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Equation {
     /// The side that holds the unknown.
-    pub left: ExpressionId,
+    pub(crate) left: ExpressionId,
     /// The other side.
-    pub right: ExpressionId,
+    pub(crate) right: ExpressionId,
     /// What it determines.
     pub unknown: Unknown,
     /// Factor of the unknown; none where it is 1.
-    pub coefficient: Option<ExpressionId>,
+    pub(crate) coefficient: Option<ExpressionId>,
     /// What the product is equal to.
-    pub rest: ExpressionId,
+    pub(crate) rest: ExpressionId,
     /// Where it stands in the text.
     pub span: Span,
 }
@@ -109,7 +109,7 @@ pub struct ModelSpec {
     /// Variables in the order of declaration.
     pub variables: Vec<Variable>,
     /// All expressions.
-    pub expressions: Expressions,
+    pub(crate) expressions: Expressions,
     /// Equations, sorted: every value and derivative that one uses is determined by one before it.
     pub equations: Vec<Equation>,
     /// Constants and parameters in an order in which each needs only those before it.

@@ -8,7 +8,8 @@ mod types;
 mod unknown;
 mod words;
 
-pub use check::{check_units, unit_conflicts};
+pub use check::check_units;
+pub(crate) use check::unit_conflicts;
 pub(crate) use types::type_unit;
 pub use unknown::{UnknownUnit, unknown_units};
 
@@ -71,11 +72,6 @@ impl Unit {
         symbols::parse(text.trim())
     }
 
-    /// Exponents of metre, kilogram, second, ampere, kelvin, mole and candela.
-    pub fn exponents(&self) -> [f64; 7] {
-        self.exponents
-    }
-
     /// Unit of a product.
     #[must_use]
     pub fn times(&self, other: &Self) -> Self {
@@ -84,12 +80,12 @@ impl Unit {
 
     /// Unit of a quotient.
     #[must_use]
-    pub fn per(&self, other: &Self) -> Self {
+    pub(crate) fn per(&self, other: &Self) -> Self {
         self.with(other, |a, b| a - b)
     }
 
     /// Unit of a power; none where an exponent is not a number of reasonable size.
-    pub fn power(&self, exponent: f64) -> Option<Self> {
+    pub(crate) fn power(&self, exponent: f64) -> Option<Self> {
         let answer = Self {
             exponents: self
                 .exponents
@@ -103,7 +99,7 @@ impl Unit {
     }
 
     /// True when both measure the same kind of quantity.
-    pub fn same(&self, other: &Self) -> bool {
+    pub(crate) fn same(&self, other: &Self) -> bool {
         self.exponents
             .iter()
             .zip(&other.exponents)
@@ -111,7 +107,7 @@ impl Unit {
     }
 
     /// True for a pure number.
-    pub fn is_one(&self) -> bool {
+    pub(crate) fn is_one(&self) -> bool {
         self.same(&Self::ONE)
     }
 

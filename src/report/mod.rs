@@ -27,13 +27,16 @@ mod json_location;
 mod json_schema;
 mod model;
 mod overview;
+#[cfg(feature = "report")]
 mod page;
-mod plant;
+pub(crate) mod plant;
 mod read_explanation;
+#[cfg(feature = "cli")]
 mod reproduction_csv;
-pub mod text;
+pub(crate) mod text;
 mod validation_document;
 
+pub use crate::linalg::Rows;
 pub use document_error::DocumentError;
 pub use json_layout::to_json;
 pub use json_schema::schema;
@@ -42,17 +45,25 @@ pub use model::{
     ModelDocument, OutputDocument, Provenance, ReadModel, Request, parse_model, read_model,
 };
 pub use overview::{Excitation, Experiment, Overview, Watched};
+#[cfg(feature = "report")]
 pub use page::PageError;
+#[cfg(feature = "report")]
 pub use page::explanation::explanation_page;
+#[cfg(feature = "report")]
 pub use page::identification::identification_page;
+#[cfg(feature = "report")]
 pub use page::plant::plant_page;
-pub use page::reproduction::reproduction_page;
+#[cfg(feature = "cli")]
+pub(crate) use page::reproduction::reproduction_page;
 pub use plant::{
     FitDocument, IdentifiedDocument, InitialStateDocument, InnovationSizeDocument, JudgeError,
-    LINEARISATION_FORMAT, LinearisationDocument, OperatingValue, PLANT_FORMAT, PlantDocument,
-    PlantValidation, SimulatorDocument, TestDocument, Uncertain, frequency_grid, is_plant,
-    judge_plant, logarithmic, plant_fits, text_alone,
+    LINEARISATION_FORMAT, LinearisationDocument, NoiseDocument, OperatingValue, PLANT_FORMAT,
+    ParameterDocument, PlantDocument, PlantValidation, SimulatorDocument,
+    SimulatorParameterDocument, TestDocument, Uncertain, is_plant, judge_plant,
 };
+#[cfg(feature = "cli")]
+pub(crate) use plant::{frequency_grid, logarithmic, plant_fits, text_alone};
 pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
-pub use reproduction_csv::reproduction_csv;
+#[cfg(feature = "cli")]
+pub(crate) use reproduction_csv::reproduction_csv;
 pub use validation_document::{PLANT_VALIDATION_FORMAT, VALIDATION_FORMAT, ValidationDocument};

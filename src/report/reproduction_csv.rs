@@ -10,7 +10,7 @@ use crate::reproduce::{Curve, Reproduction};
 ///
 /// # Errors
 /// [`csv::Error`], which writing to memory does not bring about.
-pub fn reproduction_csv(reproduction: &Reproduction) -> Result<String, csv::Error> {
+pub(crate) fn reproduction_csv(reproduction: &Reproduction) -> Result<String, csv::Error> {
     let mut rows = Rows(csv::Writer::from_writer(Vec::new()));
     rows.0.write_record([
         "kind", "part", "panel", "series", "line", "x", "value", "lower", "upper",

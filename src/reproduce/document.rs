@@ -6,56 +6,56 @@ use serde::Serialize;
 use super::figure::{Bars, Figure, Table};
 
 /// Kind and version of the document.
-pub const REPRODUCTION_FORMAT: &str = "innovant-reproduction/1";
+pub(crate) const REPRODUCTION_FORMAT: &str = "innovant-reproduction/1";
 
 /// One experiment of a paper, run again.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Reproduction {
+pub(crate) struct Reproduction {
     /// `innovant-reproduction/1`.
-    pub format: String,
+    pub(crate) format: String,
     /// Version of innovant that wrote it.
-    pub version: String,
+    pub(crate) version: String,
     /// Name of the experiment on the command line.
-    pub experiment: String,
+    pub(crate) experiment: String,
     /// What is reproduced.
-    pub title: String,
+    pub(crate) title: String,
     /// The paper.
-    pub paper: String,
+    pub(crate) paper: String,
     /// Number of Monte Carlo runs.
-    pub runs: usize,
+    pub(crate) runs: usize,
     /// Number of runs that the paper used.
-    pub paper_runs: usize,
+    pub(crate) paper_runs: usize,
     /// Seed that the runs are drawn from.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// The set-up, and which of it is the paper's.
-    pub setup: Vec<Fact>,
+    pub(crate) setup: Vec<Fact>,
     /// What the paper says, what is found here, and whether they agree.
-    pub comparison: Vec<Comparison>,
+    pub(crate) comparison: Vec<Comparison>,
     /// Line pictures.
-    pub figures: Vec<Figure>,
+    pub(crate) figures: Vec<Figure>,
     /// Bar charts.
-    pub bars: Vec<Bars>,
+    pub(crate) bars: Vec<Bars>,
     /// Tables of numbers.
-    pub tables: Vec<Table>,
+    pub(crate) tables: Vec<Table>,
     /// What to know when reading the numbers.
-    pub remarks: Vec<String>,
+    pub(crate) remarks: Vec<String>,
 }
 
 /// A line of the set-up.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Fact {
+pub(crate) struct Fact {
     /// What it is.
-    pub name: String,
+    pub(crate) name: String,
     /// Its value.
-    pub value: String,
+    pub(crate) value: String,
     /// Where it comes from.
-    pub source: Origin,
+    pub(crate) source: Origin,
 }
 
 /// Where a choice comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Origin {
+pub(crate) enum Origin {
     /// The paper prints it.
     Paper,
     /// Chosen here, because the paper is silent or in error.
@@ -64,23 +64,23 @@ pub enum Origin {
 
 /// What the paper says against what is found here.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Comparison {
+pub(crate) struct Comparison {
     /// Where in the paper.
-    pub place: String,
+    pub(crate) place: String,
     /// What the paper says.
-    pub paper: String,
+    pub(crate) paper: String,
     /// What is found here.
-    pub here: String,
+    pub(crate) here: String,
     /// Whether they agree.
-    pub agreement: Agreement,
+    pub(crate) agreement: Agreement,
     /// Why not, or by which measure.
-    pub why: String,
+    pub(crate) why: String,
 }
 
 /// Whether paper and reproduction agree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Agreement {
+pub(crate) enum Agreement {
     /// Within the stated measure.
     Yes,
     /// Some of it.
@@ -93,12 +93,12 @@ pub enum Agreement {
 
 impl Agreement {
     /// Yes or no.
-    pub fn of(agrees: bool) -> Self {
+    pub(crate) fn of(agrees: bool) -> Self {
         if agrees { Self::Yes } else { Self::No }
     }
 
     /// Yes where all agree, no where none does, partly otherwise.
-    pub fn of_all(each: impl IntoIterator<Item = bool>) -> Self {
+    pub(crate) fn of_all(each: impl IntoIterator<Item = bool>) -> Self {
         let (mut some, mut all) = (false, true);
         for agrees in each {
             some |= agrees;
@@ -112,7 +112,7 @@ impl Agreement {
     }
 
     /// In a word or two.
-    pub fn words(self) -> &'static str {
+    pub(crate) fn words(self) -> &'static str {
         match self {
             Self::Yes => "yes",
             Self::Partly => "partly",

@@ -5,60 +5,60 @@ use serde::Serialize;
 
 /// Panels that belong together and share their horizontal axis.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Figure {
+pub(crate) struct Figure {
     /// Unique within the document.
-    pub id: String,
+    pub(crate) id: String,
     /// Heading.
-    pub title: String,
+    pub(crate) title: String,
     /// What there is to see.
-    pub caption: String,
+    pub(crate) caption: String,
     /// Name of the horizontal axis.
-    pub x: Quantity,
+    pub(crate) x: Quantity,
     /// Name of the vertical axis.
-    pub y: Quantity,
+    pub(crate) y: Quantity,
     /// Places on the horizontal axis.
-    pub at: Vec<f64>,
+    pub(crate) at: Vec<f64>,
     /// One picture each.
-    pub panels: Vec<Panel>,
+    pub(crate) panels: Vec<Panel>,
 }
 
 /// What an axis shows.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Quantity {
+pub(crate) struct Quantity {
     /// Name.
-    pub label: String,
+    pub(crate) label: String,
     /// Unit; empty for none.
-    pub unit: String,
+    pub(crate) unit: String,
     /// Whether it is drawn on a logarithmic scale.
-    pub logarithmic: bool,
+    pub(crate) logarithmic: bool,
 }
 
 /// One picture.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Panel {
+pub(crate) struct Panel {
     /// Heading.
-    pub title: String,
+    pub(crate) title: String,
     /// What is drawn in it, from back to front.
-    pub curves: Vec<Curve>,
+    pub(crate) curves: Vec<Curve>,
 }
 
 /// A line, or a bundle of lines of one kind, with a band around the first where there is one.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Curve {
+pub(crate) struct Curve {
     /// Name.
-    pub name: String,
+    pub(crate) name: String,
     /// What kind of line it is.
-    pub role: Role,
+    pub(crate) role: Role,
     /// Values at the places of the figure, a list for each line; null where there is none.
-    pub lines: Vec<Vec<Option<f64>>>,
+    pub(crate) lines: Vec<Vec<Option<f64>>>,
     /// Lower and upper limit at the places of the figure.
-    pub band: Option<[Vec<Option<f64>>; 2]>,
+    pub(crate) band: Option<[Vec<Option<f64>>; 2]>,
 }
 
 /// What kind of line a curve is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Role {
+pub(crate) enum Role {
     /// The truth.
     Truth,
     /// Single Monte Carlo runs.
@@ -69,68 +69,66 @@ pub enum Role {
     Second,
     /// The third method.
     Third,
-    /// The fourth method.
-    Fourth,
 }
 
 /// Bars in groups, as in Knudsen's figures.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Bars {
+pub(crate) struct Bars {
     /// Unique within the document.
-    pub id: String,
+    pub(crate) id: String,
     /// Heading.
-    pub title: String,
+    pub(crate) title: String,
     /// What there is to see.
-    pub caption: String,
+    pub(crate) caption: String,
     /// What the length of a bar is.
-    pub quantity: String,
+    pub(crate) quantity: String,
     /// A line across at this value.
-    pub reference: f64,
+    pub(crate) reference: f64,
     /// Bars longer than this are cut, and carry their value.
-    pub cut: f64,
+    pub(crate) cut: f64,
     /// One group of bars each.
-    pub groups: Vec<String>,
+    pub(crate) groups: Vec<String>,
     /// A bar in every group.
-    pub series: Vec<BarSeries>,
+    pub(crate) series: Vec<BarSeries>,
 }
 
 /// The bars of one kind.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct BarSeries {
+pub(crate) struct BarSeries {
     /// Name.
-    pub name: String,
+    pub(crate) name: String,
     /// A value for each group; null where there is none.
-    pub values: Vec<Option<f64>>,
+    pub(crate) values: Vec<Option<f64>>,
 }
 
 /// A table of numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Table {
+pub(crate) struct Table {
     /// Unique within the document.
-    pub id: String,
+    pub(crate) id: String,
     /// What it shows.
-    pub title: String,
+    pub(crate) title: String,
     /// What to know when reading it.
-    pub caption: String,
+    pub(crate) caption: String,
     /// Heading of the names of the rows.
-    pub rows_are: String,
+    pub(crate) rows_are: String,
     /// Headings of the numbers.
-    pub columns: Vec<String>,
+    pub(crate) columns: Vec<String>,
     /// Rows.
-    pub rows: Vec<Row>,
+    pub(crate) rows: Vec<Row>,
     /// Significant digits for people.
-    pub digits: usize,
+    pub(crate) digits: usize,
 }
 
 /// A row of a table.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Row {
+pub(crate) struct Row {
     /// Name.
-    pub name: String,
+    pub(crate) name: String,
     /// Numbers; null where there is none.
-    pub values: Vec<Option<f64>>,
+    pub(crate) values: Vec<Option<f64>>,
     /// Whether the paper prints this row.
-    pub printed: bool,
+    pub(crate) printed: bool,
 }
 
 /// A number, or nothing where it is not finite.

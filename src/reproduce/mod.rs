@@ -1,17 +1,5 @@
 //! The papers' experiments, run again: their tables and figures beside what they print.
 //!
-//! ```
-//! use innovant::reproduce::{Study, experiment};
-//!
-//! let study = Study { runs: Some(8), seed: 1, progress: &|| {} };
-//! let example = experiment("van-wingerden-1").ok_or("unknown")?;
-//! let found = example.reproduce(&study)?;
-//! for row in &found.comparison {
-//!     println!("{}: {} / {}: {}", row.place, row.paper, row.here, row.agreement.words());
-//! }
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
-//!
 //! An [`Experiment`] carries out a Monte Carlo study and delivers a [`Reproduction`]: comparison with the paper,
 //! pictures and tables as numbers. JSON, CSV, terminal and page are written from that one document, by
 //! `report`. Errors in print are found by computing what is printed, not by claiming it.
@@ -37,16 +25,20 @@ mod reproduce_error;
 mod statistics;
 mod van_wingerden;
 
-pub use chiuso_picci::{ChiusoPicciOne, ChiusoPicciTwo};
-pub use document::{Agreement, Comparison, Fact, Origin, REPRODUCTION_FORMAT, Reproduction};
-pub use figure::{BarSeries, Bars, Curve, Figure, Panel, Quantity, Role, Row, Table};
-pub use knudsen::{KnudsenExperiment, knudsen_experiments};
-pub use monte_carlo_runs::{LEAST_RUNS, Study};
-pub use reproduce_error::ReproduceError;
-pub use van_wingerden::{VanWingerdenOne, VanWingerdenTwo};
+pub(crate) use chiuso_picci::{ChiusoPicciOne, ChiusoPicciTwo};
+#[cfg(test)]
+pub(crate) use document::Fact;
+pub(crate) use document::{Agreement, Comparison, Origin, REPRODUCTION_FORMAT, Reproduction};
+#[cfg(test)]
+pub(crate) use figure::BarSeries;
+pub(crate) use figure::{Bars, Curve, Figure, Panel, Quantity, Role, Row, Table};
+pub(crate) use knudsen::knudsen_experiments;
+pub(crate) use monte_carlo_runs::Study;
+pub(crate) use reproduce_error::ReproduceError;
+pub(crate) use van_wingerden::{VanWingerdenOne, VanWingerdenTwo};
 
 /// An experiment of a paper.
-pub trait Experiment: Sync {
+pub(crate) trait Experiment: Sync {
     /// Its name on the command line.
     fn name(&self) -> &'static str;
 
@@ -69,7 +61,7 @@ pub trait Experiment: Sync {
 }
 
 /// All experiments, in the order of the papers.
-pub fn experiments() -> Vec<&'static dyn Experiment> {
+pub(crate) fn experiments() -> Vec<&'static dyn Experiment> {
     let mut all: Vec<&'static dyn Experiment> = vec![
         &VanWingerdenOne,
         &VanWingerdenTwo,
@@ -83,7 +75,7 @@ pub fn experiments() -> Vec<&'static dyn Experiment> {
 }
 
 /// The experiment of that name.
-pub fn experiment(name: &str) -> Option<&'static dyn Experiment> {
+pub(crate) fn experiment(name: &str) -> Option<&'static dyn Experiment> {
     experiments().into_iter().find(|e| e.name() == name)
 }
 

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::reproduce_error::ReproduceError;
 
 /// Fewest runs from which a spread is estimated: with fewer, a variance is uncertain by half of itself.
-pub const LEAST_RUNS: usize = 8;
+pub(crate) const LEAST_RUNS: usize = 8;
 
 /// Largest share of runs in which a method may fail: a failure is an outcome too, but beyond this the others do not
 /// speak for the method any more.
@@ -15,13 +15,13 @@ const LARGEST_SHARE_OF_FAILURES: f64 = 0.05;
 
 /// How an experiment is carried out.
 #[derive(Clone, Copy)]
-pub struct Study<'a> {
+pub(crate) struct Study<'a> {
     /// Number of runs; `None` for as many as the paper has.
-    pub runs: Option<usize>,
+    pub(crate) runs: Option<usize>,
     /// Seed that the seeds of the runs are drawn from.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Called once after each run, from any thread.
-    pub progress: &'a (dyn Fn() + Sync),
+    pub(crate) progress: &'a (dyn Fn() + Sync),
 }
 
 impl Study<'_> {

@@ -8,7 +8,7 @@ use crate::model::ModelError;
 /// A reproduction that cannot be carried out.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum ReproduceError {
+pub(crate) enum ReproduceError {
     /// Statistics over runs need runs.
     #[error(
         "{runs} runs are too few for statistics over runs; ask for at least {least} with --runs"

@@ -101,7 +101,7 @@ impl KnudsenExample {
 }
 
 /// ARMAX parameters in the order of Knudsen's table 1: `a1..an, b0..bn, c1..cn, sigma^2`.
-pub fn armax_parameters(armax: &Armax, variance: f64) -> Vec<f64> {
+pub(crate) fn armax_parameters(armax: &Armax, variance: f64) -> Vec<f64> {
     let mut parameters = armax.a[1..].to_vec();
     parameters.extend(&armax.b);
     parameters.extend(&armax.c[1..]);

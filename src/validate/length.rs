@@ -30,7 +30,7 @@ pub(crate) fn too_short(
 
 impl TooShort {
     /// In plain words.
-    pub fn sentence(&self) -> String {
+    pub(crate) fn sentence(&self) -> String {
         let Self {
             samples,
             parameters,

@@ -45,8 +45,8 @@
 //!
 //! Source: Ljung, *System Identification*, 2nd ed. (1999), chapter 16.
 
-mod deviations;
-mod identified;
+pub(crate) mod deviations;
+pub(crate) mod identified;
 mod innovation_size;
 mod length;
 mod linearity;
@@ -61,10 +61,11 @@ mod verdict;
 #[cfg(test)]
 mod tests;
 
-pub use deviations::{Deviations, Zero, judge};
-pub use identified::{TestedModel, identify_and_test, test_residuals};
+#[cfg(feature = "cli")]
+pub(crate) use deviations::{Deviations, Zero, judge};
+pub use identified::{TestedModel, identify_and_test};
 pub(crate) use length::too_short;
-pub use residuals::fit_measure;
+pub(crate) use residuals::fit_measure;
 pub use result::{
     FitMeasure, InnovationSize, LinearityScope, OutputFit, OutputSize, PairCorrelation,
     ResidualTest, Strongest, TooShort, Validation,

@@ -5,6 +5,7 @@ use crate::model::ModelError;
 
 /// Data or options that do not allow a judgement.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ValidateError {
     /// There is no record.
     #[error("there is no recording to validate the model on")]

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use innovant::systems;
+use innovant::internal::systems;
 
 use crate::folder::Folder;
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use innovant::systems;
+use innovant::internal::systems;
 use serde_json::Value;
 
 use crate::folder::{Folder, Run, json};

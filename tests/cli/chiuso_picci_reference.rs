@@ -6,9 +6,11 @@ use std::path::PathBuf;
 
 use assert_cmd::Command;
 use innovant::covariance::frequency_response_covariance;
-use innovant::identify::variance::{AsymptoticMethod, asymptotic_covariance};
 use innovant::identify::{Prediction, Weight};
-use innovant::systems::{ClosedLoop, chiuso_picci_one, chiuso_picci_two, van_wingerden_one};
+use innovant::internal::identify::{AsymptoticMethod, asymptotic_covariance};
+use innovant::internal::systems::{
+    ClosedLoop, chiuso_picci_one, chiuso_picci_two, van_wingerden_one,
+};
 use nalgebra::DMatrix;
 use serde_json::Value;
 

@@ -1,8 +1,8 @@
 //! Questions that `innovant explain` cannot answer end in exit code 2 and one message that says where and what to do,
 //! and leave no file behind; so do explanations that cannot be simulated.
 
+use innovant::internal::systems;
 use innovant::model::StateSpace;
-use innovant::systems;
 use serde_json::Value;
 
 use crate::folder::{Folder, json};
@@ -371,7 +371,7 @@ fn options_that_are_not_possible() {
 #[test]
 fn the_help_lists_the_effects() {
     let help = Folder::new().run(&["explain", "--help"]).ok();
-    let mut missing: Vec<&str> = innovant::explain::effects::library()
+    let mut missing: Vec<&str> = innovant::internal::effects::library()
         .map(|d| d.id)
         .filter(|id| !help.contains(id))
         .collect();

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use innovant::systems;
+use innovant::internal::systems;
 use serde_json::Value;
 
 use crate::folder::{Folder, json};

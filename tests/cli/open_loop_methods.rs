@@ -1,13 +1,13 @@
 //! Knudsen's methods, the prediction error method and subid through the whole pipeline: library, command line, JSON.
 
 use innovant::covariance::pole_uncertainties;
-use innovant::identify::method::Method;
-use innovant::identify::stochastic::Stochastic;
+use innovant::identify::Method;
+use innovant::identify::Stochastic;
 use innovant::identify::{Model, Options, Order, Polish, identify};
-use innovant::linalg::{spectral_radius, symmetric_eigen};
+use innovant::internal::linalg::{spectral_radius, symmetric_eigen};
+use innovant::internal::systems;
 use innovant::log::Log;
 use innovant::model::StateSpace;
-use innovant::systems;
 
 use crate::folder::{Folder, json};
 

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use innovant::systems;
+use innovant::internal::systems;
 
 use crate::folder::{Folder, json};
 

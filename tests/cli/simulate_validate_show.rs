@@ -2,8 +2,8 @@
 
 use std::fs;
 
+use innovant::internal::systems;
 use innovant::log::Log;
-use innovant::systems;
 
 use crate::folder::{Folder, columns};
 

@@ -1,8 +1,8 @@
 //! `explain` on arbitrary small logs and simulations.
 
 use innovant::Model;
-use innovant::explain::effects::library;
 use innovant::explain::{Options, Simulation, explain};
+use innovant::internal::effects::library;
 use innovant::log::Log;
 use innovant::report::parse_model;
 use serde_json::json;

@@ -1,8 +1,8 @@
 //! The reader of explanations: documents after hostile edits, and any bytes.
 
-use innovant::explain::effects::{Port, library};
 use innovant::explain::{AugmentedError, Explanation};
-use innovant::report::text::explanation_text;
+use innovant::internal::effects::{Port, library};
+use innovant::internal::report::explanation_text;
 use innovant::report::{explanation_page, is_explanation, parse_explanation, to_json};
 use serde_json::{Value, json};
 

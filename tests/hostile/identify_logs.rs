@@ -1,10 +1,10 @@
 //! `identify` on arbitrary small logs with arbitrary options.
 
+use innovant::identify::Detrend;
 use innovant::identify::{
     CovarianceKind, Method, Options, Order, Polish, Stochastic, Weight, identify,
 };
 use innovant::log::Log;
-use innovant::moments::Detrend;
 
 use super::bytes::Bytes;
 use super::logs::{MOST_SAMPLES, log, sample_time};

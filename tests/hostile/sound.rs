@@ -2,8 +2,8 @@
 
 use innovant::Model;
 use innovant::covariance::invariants;
+use innovant::internal::report::{Style, show_text};
 use innovant::log::Log;
-use innovant::report::text::{Style, show_text};
 use innovant::report::{ModelDocument, parse_model};
 
 use super::logs::white;

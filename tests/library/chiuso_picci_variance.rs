@@ -2,7 +2,7 @@
 //! examples) is `cargo run --release --example variance_study`.
 
 use innovant::identify::{Method, Weight};
-use innovant::systems::{chiuso_picci_frequencies, chiuso_picci_one};
+use innovant::internal::systems::{chiuso_picci_frequencies, chiuso_picci_one};
 
 use crate::variance::Study;
 

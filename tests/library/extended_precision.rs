@@ -2,10 +2,10 @@
 //! digits), from well-conditioned recordings to those at the edge of what doubles can tell: errors in units of the
 //! standard deviations that the model states.
 
-use innovant::identify::varx;
-use innovant::linalg::{cholesky_upper, solve_upper_transposed};
-use innovant::moments::{PanelQr, RFactor, Route, Trend};
-use innovant::systems::two_by_two;
+use innovant::internal::identify::varx;
+use innovant::internal::linalg::{cholesky_upper, solve_upper_transposed};
+use innovant::internal::moments::{PanelQr, RFactor, Route, Trend};
+use innovant::internal::systems::two_by_two;
 use nalgebra::DMatrix;
 
 /// An unevaluated sum of two doubles (Dekker 1971, Knuth).

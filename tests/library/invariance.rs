@@ -8,9 +8,9 @@ use innovant::identify::{
     CovarianceKind, FileRecords, Method, Order, Recording, Records, ReducedRecords, SAMPLES_KEPT,
     identify_records,
 };
+use innovant::internal::systems::{servo, two_by_two, van_wingerden_one};
 use innovant::log::{Channel, Log, LogError, Roles, Source};
 use innovant::report::ModelDocument;
-use innovant::systems::{servo, two_by_two, van_wingerden_one};
 use innovant::{Model, Options, identify};
 use proptest::prelude::*;
 use proptest::sample::Index;

@@ -7,7 +7,7 @@ use innovant::covariance::{
     static_gain_std,
 };
 use innovant::identify::{Method, Order};
-use innovant::systems::knudsen_armax;
+use innovant::internal::systems::knudsen_armax;
 use innovant::{Options, identify};
 use rayon::prelude::*;
 

@@ -1,15 +1,16 @@
 //! The lean covariance against van Wingerden's own form, written out with matrices as long as the record,
 //! and the sign of the beta terms (B.2), (B.4), which is wrong in print.
 
-use innovant::identify::variance::{subspace_covariance, subspace_jacobian};
-use innovant::identify::{
-    Estimate, Varx, Weight, decompose, predictor_coefficients, system_matrices, varx,
+use innovant::identify::Weight;
+use innovant::internal::identify::{
+    Estimate, Varx, decompose, predictor_coefficients, system_matrices, varx,
 };
-use innovant::linalg::{pseudo_inverse, symmetric_square_root_factor};
+use innovant::internal::identify::{subspace_covariance, subspace_jacobian};
+use innovant::internal::linalg::{pseudo_inverse, symmetric_square_root_factor};
+use innovant::internal::moments::RFactor;
+use innovant::internal::systems::{TestSystem, van_wingerden_one};
 use innovant::log::Log;
 use innovant::model::StateSpace;
-use innovant::moments::RFactor;
-use innovant::systems::{TestSystem, van_wingerden_one};
 use nalgebra::DMatrix;
 
 struct Problem {

@@ -2,10 +2,10 @@
 //! the compact form; and what the errors in print do.
 
 use innovant::covariance::{ParameterCovariance, frequency_response_covariance};
-use innovant::identify::variance::{AsymptoticMethod, asymptotic_covariance};
 use innovant::identify::{Prediction, Weight};
-use innovant::linalg::discrete_lyapunov;
-use innovant::systems::{ClosedLoop, chiuso_picci_one, van_wingerden_one};
+use innovant::internal::identify::{AsymptoticMethod, asymptotic_covariance};
+use innovant::internal::linalg::discrete_lyapunov;
+use innovant::internal::systems::{ClosedLoop, chiuso_picci_one, van_wingerden_one};
 use nalgebra::DMatrix;
 
 type Matrix = DMatrix<f64>;

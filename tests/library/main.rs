@@ -15,6 +15,7 @@ mod methods;
 mod model_document;
 mod orders;
 mod properties;
+mod public_api;
 mod shape;
 #[path = "../support/variance.rs"]
 mod variance;

@@ -3,8 +3,8 @@
 
 use innovant::covariance::{Covariance2, frequency_response_covariance, noise_response_covariance};
 use innovant::identify::{CovarianceKind, Method, Order, Polish, Stochastic, Weight};
+use innovant::internal::systems::{TestSystem, two_by_two, van_wingerden_one};
 use innovant::log::Log;
-use innovant::systems::{TestSystem, two_by_two, van_wingerden_one};
 use innovant::{Model, Options, identify};
 use nalgebra::DMatrix;
 use num_complex::Complex64;

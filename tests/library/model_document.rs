@@ -1,8 +1,8 @@
 //! The document `innovant-model/1`: round trips, and the published schema.
 
 use innovant::identify::{CovarianceKind, Order};
+use innovant::internal::systems;
 use innovant::report::{ModelDocument, parse_model, schema};
-use innovant::systems;
 use innovant::{Model, Options, identify};
 use serde_json::Value;
 

@@ -2,7 +2,7 @@
 //! freedom, in which a weak state hardly shows.
 
 use innovant::identify::{OrderEvidence, identify};
-use innovant::systems::{TestSystem, two_by_two};
+use innovant::internal::systems::{TestSystem, two_by_two};
 use innovant::{Model, Options};
 use nalgebra::DMatrix;
 use rayon::prelude::*;

@@ -2,11 +2,11 @@
 //! into files or blocks; and what must be found exactly.
 
 use innovant::covariance::frequency_response_covariance;
+use innovant::identify::Detrend;
 use innovant::identify::{Method, Order, Polish, Weight};
+use innovant::internal::systems::{TestSystem, servo, two_by_two, van_wingerden_one};
 use innovant::log::Log;
 use innovant::model::StateSpace;
-use innovant::moments::Detrend;
-use innovant::systems::{TestSystem, servo, two_by_two, van_wingerden_one};
 use innovant::{IdentifyError, Model, Options, identify};
 use nalgebra::DMatrix;
 use proptest::prelude::*;

@@ -1,10 +1,11 @@
 //! A drive with dry friction, an oscillator with a cubic spring, and a hair dryer that a linear model describes, through
 //! the library. Their splits are those of the benchmarks; the fits see the training part only.
 
+use innovant::Model;
 use innovant::explain::{Explanation, Options, Simulation, Verdict, explain};
 use innovant::identify;
+use innovant::internal::linalg::spectral_radius;
 use innovant::log::{Log, Roles, Source};
-use innovant::{Model, linalg::spectral_radius};
 
 use crate::recordings;
 

@@ -4,7 +4,7 @@ use innovant::Model;
 use innovant::covariance::{
     Covariance2, Path, ellipse_quantile, pole_uncertainties, response_bands,
 };
-use innovant::systems::TestSystem;
+use innovant::internal::systems::TestSystem;
 use num_complex::Complex64;
 
 /// Truths that were inside 95 and 99 % regions.

@@ -1,8 +1,8 @@
 //! How the recordings of `data/` are made: simulated test systems, operating points added, rounded as a
 //! data logger would.
 
+use innovant::internal::systems;
 use innovant::log::{Channel, Log};
-use innovant::systems;
 
 /// File names and contents.
 pub fn recordings() -> Vec<(&'static str, String)> {

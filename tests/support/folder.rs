@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 use assert_cmd::Command;
+use innovant::internal::systems::TestSystem;
 use innovant::log::Log;
-use innovant::systems::TestSystem;
 use serde_json::Value;
 use tempfile::TempDir;
 

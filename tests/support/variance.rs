@@ -1,10 +1,10 @@
 //! Estimated against Monte Carlo and true asymptotic variance of a frequency response, as in section 5 of Chiuso & Picci.
 
 use innovant::covariance::frequency_response_covariance;
-use innovant::identify::variance::{AsymptoticMethod, asymptotic_covariance};
+use innovant::identify::Detrend;
 use innovant::identify::{Method, Order, Polish, Prediction, Weight};
-use innovant::moments::Detrend;
-use innovant::systems::ClosedLoop;
+use innovant::internal::identify::{AsymptoticMethod, asymptotic_covariance};
+use innovant::internal::systems::ClosedLoop;
 use innovant::{Options, identify};
 use num_complex::Complex64;
 use rayon::prelude::*;

@@ -15,16 +15,16 @@ use crate::report::{PlantDocument, is_explanation, is_plant, parse_explanation};
 
 /// A plant from a file.
 pub(crate) struct LoadedPlant {
-    pub plant: Plant,
+    pub(crate) plant: Plant,
     /// Values of the text, or those that were estimated.
-    pub point: Point,
-    pub hold: Hold,
+    pub(crate) point: Point,
+    pub(crate) hold: Hold,
     /// What was estimated, where the file says so.
-    pub document: Option<PlantDocument>,
+    pub(crate) document: Option<PlantDocument>,
     /// The explanation that it comes from.
-    pub explanation: Option<Explanation>,
+    pub(crate) explanation: Option<Explanation>,
     /// What may be wrong with the text.
-    pub warnings: Vec<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 impl LoadedPlant {

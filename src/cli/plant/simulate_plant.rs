@@ -30,15 +30,15 @@ pub(crate) enum Start {
 
 /// What is asked of a plant.
 pub(crate) struct PlantRun<'a> {
-    pub plant: &'a Path,
-    pub input: &'a Source,
-    pub roles: &'a RoleFlags,
-    pub parameters: Option<&'a str>,
-    pub start: Start,
-    pub hold: Option<Hold>,
+    pub(crate) plant: &'a Path,
+    pub(crate) input: &'a Source,
+    pub(crate) roles: &'a RoleFlags,
+    pub(crate) parameters: Option<&'a str>,
+    pub(crate) start: Start,
+    pub(crate) hold: Option<Hold>,
     /// Answer of the original simulator to this input.
-    pub simulation: Option<&'a Path>,
-    pub output: &'a Path,
+    pub(crate) simulation: Option<&'a Path>,
+    pub(crate) output: &'a Path,
 }
 
 pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {

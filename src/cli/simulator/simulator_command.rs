@@ -32,7 +32,7 @@ const SAME_TIME: f64 = 0.01;
 #[derive(Debug)]
 pub(super) struct SimulatorCommand {
     /// As given.
-    pub text: String,
+    pub(super) text: String,
     words: Vec<String>,
     inputs: Vec<String>,
     outputs: Vec<String>,

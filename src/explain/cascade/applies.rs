@@ -17,12 +17,12 @@ const KEPT: f64 = 0.25;
 
 /// Recordings before anything is done to them.
 pub(super) struct View<'a> {
-    pub records: &'a [(&'a [f64], &'a [f64])],
-    pub mask: &'a [Vec<bool>],
+    pub(super) records: &'a [(&'a [f64], &'a [f64])],
+    pub(super) mask: &'a [Vec<bool>],
 }
 
 impl View<'_> {
-    pub fn counted(&self) -> impl Iterator<Item = (f64, f64)> {
+    pub(crate) fn counted(&self) -> impl Iterator<Item = (f64, f64)> {
         self.records
             .iter()
             .zip(self.mask)
@@ -35,7 +35,7 @@ impl View<'_> {
     }
 
     /// Mean size of the input, mean of the output.
-    pub fn units(&self) -> Option<(f64, f64)> {
+    pub(crate) fn units(&self) -> Option<(f64, f64)> {
         let n = self.counted().count() as f64;
         let (u, y) = self
             .counted()
@@ -45,7 +45,7 @@ impl View<'_> {
     }
 
     /// Whether to go on, and then whether the input needs a bias. A few passes over the samples.
-    pub fn applies(&self) -> Option<bool> {
+    pub(crate) fn applies(&self) -> Option<bool> {
         let shapes = self.records.len() == self.mask.len()
             && self
                 .records

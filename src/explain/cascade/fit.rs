@@ -17,28 +17,28 @@ const SETTLED: f64 = 1e-6;
 #[derive(Debug, Clone)]
 pub(super) struct Problem {
     /// `(input, output)`.
-    pub records: Vec<(Vec<f64>, Vec<f64>)>,
-    pub mask: Vec<Vec<bool>>,
+    pub(super) records: Vec<(Vec<f64>, Vec<f64>)>,
+    pub(super) mask: Vec<Vec<bool>>,
     /// Samples that count.
-    pub count: usize,
+    pub(super) count: usize,
 }
 
 /// Numbers and initial levels, with the sum of the squared errors.
 #[derive(Debug, Clone)]
 pub(super) struct Trial {
-    pub cascade: Cascade,
-    pub initial: Vec<[f64; 2]>,
-    pub cost: f64,
+    pub(super) cascade: Cascade,
+    pub(super) initial: Vec<[f64; 2]>,
+    pub(super) cost: f64,
 }
 
 impl Trial {
     /// How many numbers are free.
-    pub fn free(&self) -> usize {
+    pub(crate) fn free(&self) -> usize {
         self.searched().len() + 2 * self.initial.len()
     }
 
     /// Numbers of the parts that are present.
-    pub fn searched(&self) -> Vec<Number> {
+    pub(crate) fn searched(&self) -> Vec<Number> {
         Number::ALL
             .into_iter()
             .filter(|n| self.cascade.parts.has(*n))
@@ -96,13 +96,17 @@ impl Problem {
     }
 
     /// `trial` with its cost.
-    pub fn priced(&self, mut trial: Trial) -> Trial {
+    pub(crate) fn priced(&self, mut trial: Trial) -> Trial {
         trial.cost = self.cost(&trial);
         trial
     }
 
     /// Normal equations `H step = pull` in the coordinates of [`Trial::moved`].
-    pub fn normal(&self, trial: &Trial, searched: &[Number]) -> (DMatrix<f64>, DVector<f64>) {
+    pub(crate) fn normal(
+        &self,
+        trial: &Trial,
+        searched: &[Number],
+    ) -> (DMatrix<f64>, DVector<f64>) {
         let numbers = trial.cascade.numbers;
         let jets: [Jet; NUMBERS] = std::array::from_fn(|i| Jet::variable(numbers[i], i));
         let size = searched.len() + 2 * trial.initial.len();
@@ -151,7 +155,7 @@ impl Problem {
     }
 
     /// Levenberg and Marquardt, at most `steps` of them, over the numbers `searched` and the initial levels.
-    pub fn refine(&self, mut trial: Trial, searched: &[Number], steps: usize) -> Trial {
+    pub(crate) fn refine(&self, mut trial: Trial, searched: &[Number], steps: usize) -> Trial {
         let (mut damping, mut small) = (1e-2, 0);
         for _ in 0..steps {
             let (h, pull) = self.normal(&trial, searched);

@@ -10,12 +10,12 @@ pub(super) const SLOTS: usize = NUMBERS + 2;
 /// A number with its derivatives.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Jet {
-    pub value: f64,
-    pub slopes: [f64; SLOTS],
+    pub(super) value: f64,
+    pub(super) slopes: [f64; SLOTS],
 }
 
 impl Jet {
-    pub fn variable(value: f64, slot: usize) -> Self {
+    pub(crate) fn variable(value: f64, slot: usize) -> Self {
         Self {
             value,
             slopes: std::array::from_fn(|i| f64::from(u8::from(i == slot))),

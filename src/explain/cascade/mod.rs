@@ -74,7 +74,7 @@ const SUBSTEPS: usize = 2;
 const NUMBERS: usize = 8;
 
 impl Number {
-    pub const ALL: [Self; NUMBERS] = [
+    pub(crate) const ALL: [Self; NUMBERS] = [
         Self::Pump,
         Self::UpperOutflow,
         Self::LowerOutflow,
@@ -116,16 +116,16 @@ pub(crate) enum Law {
 /// Which parts are present.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Parts {
-    pub law: Law,
-    pub upper_overflow: bool,
-    pub lower_overflow: bool,
-    pub constant_inflow: bool,
-    pub pump_bias: bool,
+    pub(crate) law: Law,
+    pub(crate) upper_overflow: bool,
+    pub(crate) lower_overflow: bool,
+    pub(crate) constant_inflow: bool,
+    pub(crate) pump_bias: bool,
 }
 
 impl Parts {
     /// Whether a number belongs to what is present.
-    pub fn has(self, number: Number) -> bool {
+    pub(crate) fn has(self, number: Number) -> bool {
         match number {
             Number::Pump | Number::UpperOutflow | Number::LowerOutflow => true,
             Number::UpperRim | Number::Share => self.upper_overflow,
@@ -144,12 +144,12 @@ impl Parts {
 /// A cascade of two tanks. Numbers whose part is absent are ignored (those of a fit are 0).
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cascade {
-    pub parts: Parts,
-    pub numbers: [f64; NUMBERS],
+    pub(crate) parts: Parts,
+    pub(crate) numbers: [f64; NUMBERS],
 }
 
 impl Cascade {
-    pub fn number(&self, number: Number) -> f64 {
+    pub(crate) fn number(&self, number: Number) -> f64 {
         self.numbers[number as usize]
     }
 
@@ -158,14 +158,14 @@ impl Cascade {
     }
 
     /// Output at each sample of the input, from the levels `initial` at the first.
-    pub fn simulate(&self, input: &[f64], initial: [f64; 2]) -> Vec<f64> {
+    pub(crate) fn simulate(&self, input: &[f64], initial: [f64; 2]) -> Vec<f64> {
         let mut output = Vec::with_capacity(input.len());
         self.walk(&self.numbers, input, initial, |[_, x2]| output.push(x2));
         output
     }
 
     /// Both levels at each sample.
-    pub fn levels(&self, input: &[f64], initial: [f64; 2]) -> Vec<[f64; 2]> {
+    pub(crate) fn levels(&self, input: &[f64], initial: [f64; 2]) -> Vec<[f64; 2]> {
         let mut levels = Vec::with_capacity(input.len());
         self.walk(&self.numbers, input, initial, |x| levels.push(x));
         levels

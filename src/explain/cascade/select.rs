@@ -33,13 +33,13 @@ const ROUNDING: f64 = 1e-9;
 )]
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Losses {
-    pub outflow: f64,
+    pub(crate) outflow: f64,
     /// Both rims.
-    pub overflow: f64,
-    pub upper_overflow: f64,
+    pub(crate) overflow: f64,
+    pub(crate) upper_overflow: f64,
     /// Not a part, but which tank is which: the same class with the slower tank at the other place. Small where both
     /// answers explain the recordings; infinite where there is no second one.
-    pub exchange: f64,
+    pub(crate) exchange: f64,
 }
 
 /// The cascade that recordings ask for.
@@ -49,19 +49,19 @@ pub(crate) struct Losses {
 )]
 #[derive(Debug, Clone)]
 pub(crate) struct CascadeFit {
-    pub cascade: Cascade,
+    pub(crate) cascade: Cascade,
     /// Standard deviations of its numbers: white errors, then widened by `count / effective`. Infinite where the
     /// recordings say nothing, zero for numbers that are absent.
-    pub deviations: [f64; NUMBERS],
+    pub(crate) deviations: [f64; NUMBERS],
     /// Levels at the first sample of each record.
-    pub initial: Vec<[f64; 2]>,
+    pub(crate) initial: Vec<[f64; 2]>,
     /// Root mean square of the residual over the samples that count.
-    pub error: f64,
+    pub(crate) error: f64,
     /// Samples that count.
-    pub count: usize,
+    pub(crate) count: usize,
     /// Free numbers, the initial levels of each record among them.
-    pub free: usize,
-    pub losses: Losses,
+    pub(crate) free: usize,
+    pub(crate) losses: Losses,
 }
 
 /// Fits cascades to records `(input, output)`; `mask` says which samples count. `None` when they cannot come from tanks, or

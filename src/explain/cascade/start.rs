@@ -21,7 +21,7 @@ const SHARE: f64 = 0.3;
 
 impl Problem {
     /// Cascades without rims on the grid of time constants, the best first.
-    pub fn grid(&self, law: Law, pump_bias: bool) -> Vec<Trial> {
+    pub(crate) fn grid(&self, law: Law, pump_bias: bool) -> Vec<Trial> {
         let parts = Parts {
             law,
             upper_overflow: false,
@@ -84,7 +84,7 @@ impl Problem {
     }
 
     /// `trial` with other parts: those that are new get starting values.
-    pub fn furnished(&self, trial: &Trial, parts: Parts, below_upper_rim: f64) -> Trial {
+    pub(crate) fn furnished(&self, trial: &Trial, parts: Parts, below_upper_rim: f64) -> Trial {
         let mut next = trial.clone();
         let before = trial.cascade.parts;
         if parts.upper_overflow && !before.upper_overflow {
@@ -112,7 +112,7 @@ impl Problem {
     }
 
     /// Mean time constants of both tanks, in samples.
-    pub fn times(&self, trial: &Trial) -> [f64; 2] {
+    pub(crate) fn times(&self, trial: &Trial) -> [f64; 2] {
         let cascade = &trial.cascade;
         let speed = [
             cascade.number(Number::UpperOutflow),
@@ -136,7 +136,7 @@ impl Problem {
 
     /// The tanks exchanged: about the mean levels, the response of the output to small flows is the same, so there
     /// is an optimum on either side. With `f = T2 / T1`, flows scale by `f` and the upper level by `f^2`.
-    pub fn exchanged(&self, trial: &Trial) -> Trial {
+    pub(crate) fn exchanged(&self, trial: &Trial) -> Trial {
         let [upper, lower] = self.times(trial);
         let f = lower / upper;
         let mut next = trial.clone();

@@ -21,8 +21,8 @@ const LEAST_LAG: f64 = 1.0;
 /// What reads the same on the other clock: `recording[k] = simulation[k (1 + rate) + shift]`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Drift {
-    pub rate: f64,
-    pub shift: f64,
+    pub(crate) rate: f64,
+    pub(crate) shift: f64,
 }
 
 impl Drift {

@@ -25,7 +25,7 @@ pub(crate) enum Kind {
 
 impl Kind {
     /// The library's name of it, where it is an answer of its own; the others are said in words.
-    pub fn id(self) -> Option<&'static str> {
+    pub(crate) fn id(self) -> Option<&'static str> {
         match self {
             Self::Swapped => Some("swapped_outputs"),
             Self::Clock => Some("clock_drift"),
@@ -37,7 +37,7 @@ impl Kind {
     }
 
     /// Whether it is a relation between the numbers of the simulation and those of the recording: a parameter.
-    pub fn is_relation(self) -> bool {
+    pub(crate) fn is_relation(self) -> bool {
         matches!(self, Self::Sign | Self::Unit)
     }
 }
@@ -45,13 +45,13 @@ impl Kind {
 /// A number that belongs to a finding.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Number {
-    pub name: &'static str,
-    pub value: f64,
-    pub unit: String,
+    pub(crate) name: &'static str,
+    pub(crate) value: f64,
+    pub(crate) unit: String,
 }
 
 impl Number {
-    pub fn new(name: &'static str, value: f64, unit: &str) -> Self {
+    pub(crate) fn new(name: &'static str, value: f64, unit: &str) -> Self {
         Self {
             name,
             value,
@@ -64,14 +64,14 @@ impl Number {
 /// [`super::Checked`]): samples that are left out hold what their neighbours say.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Trouble {
-    pub kind: Kind,
+    pub(crate) kind: Kind,
     /// Which recording, from 0.
-    pub recording: usize,
+    pub(crate) recording: usize,
     /// Which output, from 0.
-    pub output: usize,
+    pub(crate) output: usize,
     /// Samples that are left out.
-    pub left_out: Vec<Range<usize>>,
-    pub numbers: Vec<Number>,
+    pub(crate) left_out: Vec<Range<usize>>,
+    pub(crate) numbers: Vec<Number>,
     /// In plain words.
-    pub sentence: String,
+    pub(crate) sentence: String,
 }

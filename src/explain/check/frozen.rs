@@ -11,12 +11,12 @@ const SHORTEST: usize = 8;
 /// A sensor that held its value.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Freeze {
-    pub segment: usize,
-    pub output: usize,
+    pub(crate) segment: usize,
+    pub(crate) output: usize,
     /// First sample that repeats its predecessor.
-    pub from: usize,
+    pub(crate) from: usize,
     /// First sample after the run.
-    pub to: usize,
+    pub(crate) to: usize,
 }
 
 /// Runs of equal samples that chance does not make, away from the ends of the range (there a sensor saturates), while

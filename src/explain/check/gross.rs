@@ -40,20 +40,20 @@ const DROPPED: f64 = 4.0;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Gross {
     /// The value of the dropouts and their samples.
-    pub dropouts: Option<(f64, Vec<Range<usize>>)>,
+    pub(crate) dropouts: Option<(f64, Vec<Range<usize>>)>,
     /// Outliers, one sample each.
-    pub outliers: Vec<Range<usize>>,
+    pub(crate) outliers: Vec<Range<usize>>,
 }
 
 impl Gross {
-    pub fn samples(&self) -> impl Iterator<Item = &Range<usize>> {
+    pub(crate) fn samples(&self) -> impl Iterator<Item = &Range<usize>> {
         self.dropouts
             .iter()
             .flat_map(|(_, runs)| runs)
             .chain(&self.outliers)
     }
 
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.samples().next().is_none()
     }
 }

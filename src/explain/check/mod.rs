@@ -40,11 +40,11 @@ use relation::Pairs;
 /// Recordings and simulation as they are compared, and what was wrong with them.
 #[derive(Debug, Clone)]
 pub(crate) struct Checked {
-    pub recordings: Vec<Log>,
-    pub simulation: Simulation,
-    pub troubles: Vec<Trouble>,
+    pub(crate) recordings: Vec<Log>,
+    pub(crate) simulation: Simulation,
+    pub(crate) troubles: Vec<Trouble>,
     /// The simulated columns were interpolated: they are linear in the inputs only as far as that goes.
-    pub interpolated: bool,
+    pub(crate) interpolated: bool,
 }
 
 /// What interpolation between samples leaves of a linear simulator, as a share of its output, at most ...
@@ -61,7 +61,7 @@ const ALL_OF_IT: f64 = 0.999;
 impl Checked {
     /// Looks at `recordings` and the columns of `simulation`. Whatever does not fit together is left as it is: it is
     /// refused later, with the reason. `allowed` are the answers that may be given.
-    pub fn new(
+    pub(crate) fn new(
         recordings: &[Log],
         simulation: &Simulation,
         allowed: &dyn Fn(&str) -> bool,
@@ -109,7 +109,7 @@ impl Checked {
     }
 
     /// All samples of `data` but those that are left out.
-    pub fn mask(&self, data: &Data) -> Mask {
+    pub(crate) fn mask(&self, data: &Data) -> Mask {
         let mut mask: Mask = data
             .outputs_as_series()
             .map(|y| vec![true; y.len()])

@@ -75,11 +75,11 @@ const CONVERSIONS: &[Conversion] = &[
 /// What turns the simulation into what was recorded: `recording = factor simulation + offset`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Relation {
-    pub factor: f64,
-    pub offset: f64,
-    pub reversed: bool,
+    pub(crate) factor: f64,
+    pub(crate) offset: f64,
+    pub(crate) reversed: bool,
     /// Of the units: `deg per rad`.
-    pub unit: Option<String>,
+    pub(crate) unit: Option<String>,
 }
 
 /// Recording and simulation of one output, recording by recording.

@@ -54,11 +54,11 @@ const BETTER: f64 = 0.5;
 /// Where a signal wraps.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Wrap {
-    pub period: f64,
+    pub(crate) period: f64,
     /// First sample after each jump.
-    pub jumps: Vec<usize>,
+    pub(crate) jumps: Vec<usize>,
     /// The signal with its turns counted.
-    pub unwrapped: Vec<f64>,
+    pub(crate) unwrapped: Vec<f64>,
 }
 
 /// Jumps of `y` by a turn; `None` where there are none, or where it moves too fast to count turns.

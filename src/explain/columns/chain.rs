@@ -35,16 +35,16 @@ pub(super) enum Of {
 /// A coefficient of a plant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Term {
-    pub row: Row,
-    pub of: Of,
-    pub value: f64,
+    pub(super) row: Row,
+    pub(super) of: Of,
+    pub(super) value: f64,
 }
 
 /// A plant whose states are the outputs and their derivatives.
 #[derive(Debug, Clone)]
 pub(super) struct Chains {
-    pub orders: Vec<usize>,
-    pub terms: Vec<Term>,
+    pub(super) orders: Vec<usize>,
+    pub(super) terms: Vec<Term>,
 }
 
 /// Place of a coefficient of the derivative `power` of a signal in the equation of order `order`: 0 beside the output, `l + 1`
@@ -56,7 +56,7 @@ fn slot(order: usize, power: usize) -> Option<usize> {
 impl Chains {
     /// States for the equations of all outputs. A signal enters the chain of an output once for each of its derivatives, and
     /// through the chains of the others.
-    pub fn new(signals: &Signals, equations: &[OutputEquation]) -> Option<Self> {
+    pub(crate) fn new(signals: &Signals, equations: &[OutputEquation]) -> Option<Self> {
         let orders: Vec<usize> = equations.iter().map(|e| e.order).collect();
         let first: Vec<usize> = orders
             .iter()
@@ -148,7 +148,7 @@ impl Chains {
     }
 
     /// The same as a text, with a parameter for each coefficient.
-    pub fn text(
+    pub(crate) fn text(
         &self,
         signals: &Signals,
         inputs: &[Column],
@@ -274,7 +274,7 @@ impl Chains {
 }
 
 /// A column as the text names it.
-pub(super) struct Column(pub Channel);
+pub(super) struct Column(pub(super) Channel);
 
 /// Names of the states that follow an output.
 const STATES: [&str; 2] = ["_state", "_rate"];

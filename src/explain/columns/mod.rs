@@ -50,20 +50,20 @@ pub(crate) const USEFUL: f64 = 0.5;
 
 /// Equations in place of columns.
 pub(crate) struct Reproduced {
-    pub plant: Plant,
-    pub hold: Hold,
+    pub(crate) plant: Plant,
+    pub(crate) hold: Hold,
     /// Simulated outputs less those of the equations, a column a recording and output.
-    pub remainder: Series,
+    pub(crate) remainder: Series,
     /// Root mean square of the remainder over that of recorded less simulated outputs; of the output where it is largest.
-    pub misfit: f64,
+    pub(crate) misfit: f64,
 }
 
 /// What simulated outputs are to be compared with.
 pub(crate) struct Question<'a> {
-    pub inputs: &'a [Channel],
-    pub outputs: &'a [Channel],
+    pub(crate) inputs: &'a [Channel],
+    pub(crate) outputs: &'a [Channel],
     /// Root mean square of recorded less simulated, of each output.
-    pub difference: &'a [f64],
+    pub(crate) difference: &'a [f64],
 }
 
 /// Equations that were fitted to the simulated outputs.

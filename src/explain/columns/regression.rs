@@ -19,11 +19,11 @@ const DEPENDENT: f64 = 1e-5;
 /// `D^order y = sum of coefficient * D^k signal`.
 #[derive(Debug, Clone)]
 pub(super) struct OutputEquation {
-    pub order: usize,
+    pub(super) order: usize,
     /// Signal, derivative and coefficient.
-    pub terms: Vec<(usize, usize, f64)>,
+    pub(super) terms: Vec<(usize, usize, f64)>,
     /// Norm of what is left, over that of the left-hand side.
-    pub error: f64,
+    pub(super) error: f64,
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

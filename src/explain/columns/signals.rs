@@ -219,11 +219,11 @@ fn low_pass([left, right]: [&[f64]; 2], lambda: f64, h: f64) -> Vec<f64> {
 
 /// The signals of recordings.
 pub(super) struct Signals {
-    pub all: Vec<Signal>,
+    pub(super) all: Vec<Signal>,
     fine: Vec<Fine>,
     sample_time: f64,
     samples: Vec<usize>,
-    pub outputs: usize,
+    pub(super) outputs: usize,
 }
 
 /// Filtered derivatives of all signals, as columns of the triangular factor: what the geometry of least squares needs.
@@ -231,19 +231,19 @@ pub(super) struct Regressors {
     /// Highest derivative.
     order: usize,
     /// Columns of unit length: derivative 0 to `order` of each signal, then what initial states leave.
-    pub columns: Vec<Vec<f64>>,
+    pub(super) columns: Vec<Vec<f64>>,
     /// Lengths of the columns.
-    pub scale: Vec<f64>,
+    pub(super) scale: Vec<f64>,
     signals: usize,
 }
 
 impl Regressors {
-    pub fn column(&self, signal: usize, derivative: usize) -> usize {
+    pub(crate) fn column(&self, signal: usize, derivative: usize) -> usize {
         signal * (self.order + 1) + derivative
     }
 
     /// Columns of what initial states leave.
-    pub fn transients(&self) -> std::ops::Range<usize> {
+    pub(crate) fn transients(&self) -> std::ops::Range<usize> {
         self.signals * (self.order + 1)..self.columns.len()
     }
 }
@@ -256,7 +256,7 @@ fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
 
 impl Signals {
     /// Signals of recordings of one sample time; none where values are missing or a recording is too short.
-    pub fn new(recordings: &[PlantRecording], hold: Hold) -> Option<Self> {
+    pub(crate) fn new(recordings: &[PlantRecording], hold: Hold) -> Option<Self> {
         let first = recordings.first()?;
         let (outputs, inputs) = (first.outputs.len(), first.inputs.len());
         let whole = |r: &PlantRecording| {
@@ -319,7 +319,7 @@ impl Signals {
     }
 
     /// Where the chains of states start: outputs and their first derivatives.
-    pub fn start(&self, orders: &[usize]) -> Vec<Vec<f64>> {
+    pub(crate) fn start(&self, orders: &[usize]) -> Vec<Vec<f64>> {
         let of = |(j, &order): (usize, &usize)| {
             let fine = &self.fine[0];
             let known = [fine.outputs[j][0], fine.rates[j][0]];
@@ -331,7 +331,7 @@ impl Signals {
     }
 
     /// Rate of the filter: how fast the quickest output moves.
-    pub fn rate(&self) -> f64 {
+    pub(crate) fn rate(&self) -> f64 {
         let mean = |v: &mut dyn Iterator<Item = f64>| {
             let (sum, count) = v.fold((0.0, 0), |(s, n), x| (s + x, n + 1));
             sum / f64::from(count.max(1))
@@ -347,7 +347,7 @@ impl Signals {
     }
 
     /// All derivatives up to `order`, after `1/(D + rate)^order`.
-    pub fn regressors(&self, order: usize) -> Option<Regressors> {
+    pub(crate) fn regressors(&self, order: usize) -> Option<Regressors> {
         let lambda = self.rate();
         let h = self.sample_time / PARTS as f64;
         let rows: usize = self.samples.iter().sum();

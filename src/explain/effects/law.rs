@@ -6,22 +6,22 @@ use super::{Parameter, Unit};
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Clock {
     /// Time of the first sample in seconds.
-    pub start: f64,
+    pub(crate) start: f64,
     /// Sample time in seconds.
-    pub step: f64,
+    pub(crate) step: f64,
     /// The input is a new one: changes have happened before it, events of the recording are over.
-    pub fresh: bool,
+    pub(crate) fresh: bool,
 }
 
 impl Clock {
     /// Time of sample `k`.
-    pub fn time(&self, k: usize) -> f64 {
+    pub(crate) fn time(&self, k: usize) -> f64 {
         self.start + k as f64 * self.step
     }
 
     /// How much of the sample interval that begins at sample `k` lies after `change`: 0 before, 1 after, linear in
     /// between, so that a change time can be fitted.
-    pub fn share_after(&self, k: usize, change: f64) -> f64 {
+    pub(crate) fn share_after(&self, k: usize, change: f64) -> f64 {
         if self.fresh {
             1.0
         } else {
@@ -33,35 +33,35 @@ impl Clock {
 /// What a force sees over the sample interval `[k, k+1)`; `free` is what would be at its end without the force.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Motion {
-    pub position: f64,
-    pub position_free: f64,
+    pub(crate) position: f64,
+    pub(crate) position_free: f64,
     /// Change of the position at the end of the interval that a unit of this force brings.
-    pub position_gain: f64,
-    pub rate: f64,
-    pub rate_free: f64,
+    pub(crate) position_gain: f64,
+    pub(crate) rate: f64,
+    pub(crate) rate_free: f64,
     /// Change of the rate at the end of the interval that a unit of this force brings.
-    pub rate_gain: f64,
+    pub(crate) rate_gain: f64,
     /// The input that the force is matched with.
-    pub input: f64,
+    pub(crate) input: f64,
     /// Which sample, and when.
-    pub sample: usize,
-    pub clock: Clock,
+    pub(crate) sample: usize,
+    pub(crate) clock: Clock,
 }
 
 impl Motion {
     /// Position in the middle of the interval: second-order accurate for a force held over it.
-    pub fn middle(&self) -> f64 {
+    pub(crate) fn middle(&self) -> f64 {
         0.5 * (self.position + self.position_free)
     }
 
     /// Rate in the middle of the interval.
-    pub fn middle_rate(&self) -> f64 {
+    pub(crate) fn middle_rate(&self) -> f64 {
         0.5 * (self.rate + self.rate_free)
     }
 
     /// Force in `[-limit, limit]` that brings the rate at the end of the interval to rest, or as near as it can: the
     /// implicit step of Moreau and Jean, which sticks without smoothing or chatter.
-    pub fn stopping_force(&self, limit: f64) -> f64 {
+    pub(crate) fn stopping_force(&self, limit: f64) -> f64 {
         if self.rate_gain > 0.0 && limit >= 0.0 {
             (-self.rate_free / self.rate_gain).clamp(-limit, limit)
         } else {
@@ -74,17 +74,17 @@ impl Motion {
 #[derive(Debug, Clone)]
 pub(crate) struct Observed {
     /// The channel itself (an input's values, an output's, or a position).
-    pub channel: Vec<f64>,
+    pub(crate) channel: Vec<f64>,
     /// Its rate, for forces.
-    pub rate: Vec<f64>,
+    pub(crate) rate: Vec<f64>,
     /// Sample time in seconds.
-    pub step: f64,
+    pub(crate) step: f64,
     /// Times at which something may have changed: a coarse grid over the recording.
-    pub change_times: Vec<f64>,
+    pub(crate) change_times: Vec<f64>,
     /// Frequencies (Hz) at which the residual has a line.
-    pub lines: Vec<f64>,
+    pub(crate) lines: Vec<f64>,
     /// Frequencies (Hz), a log grid, at which a resonance may be missing.
-    pub frequencies: Vec<f64>,
+    pub(crate) frequencies: Vec<f64>,
 }
 
 /// Coefficients of a curve among its numbers: those of the polynomials of order two to five.

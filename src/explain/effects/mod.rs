@@ -127,7 +127,7 @@ impl Parameter {
 
 /// What sign the amplitude of a force may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sense {
+pub(crate) enum Sense {
     /// It only resists: friction dissipates, a stop pushes back.
     Resists,
     /// Either way.
@@ -136,7 +136,7 @@ pub enum Sense {
 
 /// Which of the two signals of a place a force needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Needs {
+pub(crate) enum Needs {
     /// A position.
     Position,
     /// A velocity.
@@ -186,7 +186,7 @@ pub(crate) enum Action {
 
 impl Action {
     /// Whether it enters the state equation through a direction.
-    pub fn is_force(&self) -> bool {
+    pub(crate) fn is_force(&self) -> bool {
         matches!(self, Self::Force(..) | Self::Linear(_))
     }
 }
@@ -304,7 +304,7 @@ pub fn library() -> impl Iterator<Item = &'static Definition> {
 }
 
 /// The entry with this id and variant, also of what is not physics but a number (`linear`).
-pub fn find(id: &str, variant: &str) -> Option<&'static Definition> {
+pub(crate) fn find(id: &str, variant: &str) -> Option<&'static Definition> {
     library()
         .chain(linear::ENTRIES)
         .find(|d| d.id == id && d.variant == variant)

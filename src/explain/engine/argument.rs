@@ -19,17 +19,17 @@ pub(crate) enum ArgumentForm {
 /// An expression of the plant's variables.
 #[derive(Debug, Clone)]
 pub(crate) struct Argument {
-    pub expression: String,
-    pub variables: Vec<VariableId>,
+    pub(crate) expression: String,
+    pub(crate) variables: Vec<VariableId>,
     /// Place of the equation behind which all of it is known; none where states and inputs are enough.
-    pub known_after: Option<usize>,
-    pub form: ArgumentForm,
-    pub angle: bool,
-    pub velocity: bool,
+    pub(crate) known_after: Option<usize>,
+    pub(crate) form: ArgumentForm,
+    pub(crate) angle: bool,
+    pub(crate) velocity: bool,
     /// Changes at samples only: it is made of inputs.
-    pub held: bool,
+    pub(crate) held: bool,
     /// Values along each recording.
-    pub values: Vec<Vec<f64>>,
+    pub(crate) values: Vec<Vec<f64>>,
     sorted: Vec<f64>,
 }
 
@@ -72,7 +72,7 @@ impl Argument {
     }
 
     /// Takes over the values.
-    pub fn set(&mut self, values: Vec<Vec<f64>>) {
+    pub(crate) fn set(&mut self, values: Vec<Vec<f64>>) {
         let all: Vec<f64> = values.iter().flatten().copied().collect();
         let every = (all.len() / SORTED).max(1);
         self.sorted = all.into_iter().step_by(every).collect();
@@ -81,14 +81,14 @@ impl Argument {
     }
 
     /// The value below which this part of all values lies.
-    pub fn quantile(&self, part: f64) -> f64 {
+    pub(crate) fn quantile(&self, part: f64) -> f64 {
         let last = self.sorted.len().saturating_sub(1);
         let at = (part * last as f64).round() as usize;
         self.sorted.get(at.min(last)).copied().unwrap_or(0.0)
     }
 
     /// The same of the absolute values.
-    pub fn size_quantile(&self, part: f64) -> f64 {
+    pub(crate) fn size_quantile(&self, part: f64) -> f64 {
         let mut sizes: Vec<f64> = self.sorted.iter().map(|v| v.abs()).collect();
         sizes.sort_by(f64::total_cmp);
         let last = sizes.len().saturating_sub(1);
@@ -96,18 +96,18 @@ impl Argument {
         sizes.get(at.min(last)).copied().unwrap_or(0.0)
     }
 
-    pub fn range(&self) -> f64 {
+    pub(crate) fn range(&self) -> f64 {
         self.quantile(1.0) - self.quantile(0.0)
     }
 
-    pub fn spread(&self) -> f64 {
+    pub(crate) fn spread(&self) -> f64 {
         let n = self.sorted.len().max(1) as f64;
         let mean = self.sorted.iter().sum::<f64>() / n;
         (self.sorted.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
     }
 
     /// Range of its integral, the largest of all recordings.
-    pub fn travel(&self, sample_time: f64) -> f64 {
+    pub(crate) fn travel(&self, sample_time: f64) -> f64 {
         let of = |values: &Vec<f64>| {
             let (mut sum, mut low, mut high) = (0.0f64, 0.0f64, 0.0f64);
             for v in values.iter().filter(|v| v.is_finite()) {
@@ -120,7 +120,7 @@ impl Argument {
     }
 
     /// Whether a term can be a function of it.
-    pub fn serves(&self, needs: Needs) -> bool {
+    pub(crate) fn serves(&self, needs: Needs) -> bool {
         if self.form == ArgumentForm::Product
             || self.form == ArgumentForm::Radiation && needs != Needs::Radiation
         {

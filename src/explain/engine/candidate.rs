@@ -21,14 +21,14 @@ const LEAST_YIELD: f64 = 0.05;
 /// A plant with a term more.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
-    pub plant: Plant,
+    pub(crate) plant: Plant,
     /// Names of the new parameters.
-    pub names: Vec<String>,
+    pub(crate) names: Vec<String>,
     /// Values that they start from.
-    pub values: Vec<f64>,
-    pub new_states: usize,
+    pub(crate) values: Vec<f64>,
+    pub(crate) new_states: usize,
     /// What stands at the place now.
-    pub equation: String,
+    pub(crate) equation: String,
 }
 
 /// A name that the plant does not have.
@@ -193,7 +193,7 @@ pub(super) fn equation_text(changed: &ModelSpec, spec: &ModelSpec, place: Place)
 
 impl Candidate {
     /// The numbers of a fit of the plant without the term, with the term's.
-    pub fn from(&self, fit: &Fit, parameters: usize, states: usize, outputs: usize) -> Fit {
+    pub(crate) fn from(&self, fit: &Fit, parameters: usize, states: usize, outputs: usize) -> Fit {
         let gains = if fit.form == Form::Innovation {
             states * outputs
         } else {

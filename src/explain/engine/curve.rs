@@ -21,8 +21,8 @@ const RIDGE: f64 = 1e-6;
 /// Knots of a curve, and its values there.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Curve {
-    pub knots: Vec<f64>,
-    pub values: Vec<f64>,
+    pub(crate) knots: Vec<f64>,
+    pub(crate) values: Vec<f64>,
 }
 
 /// Knots over the values of an argument.
@@ -66,7 +66,7 @@ fn piece_text(knots: &[f64], i: usize, z: &str) -> String {
 
 impl Curve {
     /// The curve as text, with names for its values.
-    pub fn text(&self, z: &str, names: &[String]) -> String {
+    pub(crate) fn text(&self, z: &str, names: &[String]) -> String {
         let pieces = names.iter().enumerate();
         let each = pieces.map(|(i, name)| format!("{name}*{}", piece_text(&self.knots, i, z)));
         each.collect::<Vec<_>>().join(" + ")

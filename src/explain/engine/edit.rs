@@ -18,7 +18,7 @@ pub(crate) enum Place {
 
 impl Place {
     /// The variable that is changed: whose derivative or value the equation determines, the input, or the parameter.
-    pub fn variable(self, spec: &ModelSpec) -> VariableId {
+    pub(crate) fn variable(self, spec: &ModelSpec) -> VariableId {
         match self {
             Self::Equation(at) => spec.equations[at].unknown.variable(),
             Self::Input(v) | Self::Parameter(v) => v,
@@ -26,7 +26,7 @@ impl Place {
     }
 
     /// Whether the equation here uses a variable.
-    pub fn uses(self, spec: &ModelSpec, variable: VariableId) -> bool {
+    pub(crate) fn uses(self, spec: &ModelSpec, variable: VariableId) -> bool {
         match self {
             Self::Equation(at) => {
                 let (left, right) = (spec.equations[at].left, spec.equations[at].right);
@@ -43,23 +43,23 @@ impl Place {
 /// A parameter that a change brings along.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct NewParameter {
-    pub name: String,
-    pub value: f64,
-    pub min: f64,
-    pub max: f64,
-    pub description: String,
+    pub(crate) name: String,
+    pub(crate) value: f64,
+    pub(crate) min: f64,
+    pub(crate) max: f64,
+    pub(crate) description: String,
 }
 
 /// A change of the text.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Edit {
-    pub parameters: Vec<NewParameter>,
+    pub(crate) parameters: Vec<NewParameter>,
     /// Declarations of other variables, each with its semicolon.
-    pub declarations: Vec<String>,
+    pub(crate) declarations: Vec<String>,
     /// Further equations, each with its semicolon.
-    pub equations: Vec<String>,
+    pub(crate) equations: Vec<String>,
     /// What stands at a place instead; `{v}` is what stood there.
-    pub changes: Vec<(Place, String)>,
+    pub(crate) changes: Vec<(Place, String)>,
 }
 
 /// Spans of every use of a variable in the equations.
@@ -154,7 +154,7 @@ pub(super) fn sections(text: &str) -> Option<(usize, usize)> {
 
 impl Edit {
     /// The text with the change.
-    pub fn text(&self, spec: &ModelSpec) -> String {
+    pub(crate) fn text(&self, spec: &ModelSpec) -> String {
         let text = &spec.text;
         let mut declarations: String = self.parameters.iter().map(declaration).collect();
         let mut equations = String::new();
@@ -222,7 +222,7 @@ impl Edit {
     }
 
     /// The plant with the change.
-    pub fn apply(&self, spec: &ModelSpec) -> Result<ModelSpec, SpecError> {
+    pub(crate) fn apply(&self, spec: &ModelSpec) -> Result<ModelSpec, SpecError> {
         parse(&self.text(spec))
     }
 }

@@ -18,24 +18,24 @@ const FEW: usize = 1;
 /// A candidate that was fitted.
 #[derive(Debug, Clone)]
 pub(crate) struct Fitted {
-    pub lead: Lead,
+    pub(crate) lead: Lead,
     /// What the term is a function of.
-    pub depends: Vec<String>,
+    pub(crate) depends: Vec<String>,
     /// The same as an expression.
-    pub argument: String,
+    pub(crate) argument: String,
     /// Values that the argument had, and the range of its integral.
-    pub range: (f64, f64),
-    pub travel: f64,
+    pub(crate) range: (f64, f64),
+    pub(crate) travel: f64,
     /// Fitted values of the shapes.
-    pub shapes: Vec<f64>,
-    pub candidate: Candidate,
-    pub fit: Fit,
+    pub(crate) shapes: Vec<f64>,
+    pub(crate) candidate: Candidate,
+    pub(crate) fit: Fit,
     /// Gain in the criterion over the plant without it, less the penalty of the search.
-    pub gain: f64,
+    pub(crate) gain: f64,
     /// Whether blocks left out prove it, whatever the gain.
-    pub proved: bool,
+    pub(crate) proved: bool,
     /// Place in the user's hypotheses; none for a term of the library.
-    pub hypothesis: Option<usize>,
+    pub(crate) hypothesis: Option<usize>,
 }
 
 impl Fitted {

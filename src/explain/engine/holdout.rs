@@ -37,31 +37,31 @@ pub(crate) enum Estimator {
 #[derive(Debug, Clone)]
 pub(crate) struct HeldOut {
     /// Mean square of each output.
-    pub squares: Vec<f64>,
+    pub(crate) squares: Vec<f64>,
     /// Variance of each output.
-    pub variances: Vec<f64>,
+    pub(crate) variances: Vec<f64>,
 }
 
 impl HeldOut {
     /// Error over that of another, the geometric mean over outputs.
-    pub fn over(&self, other: &Self) -> f64 {
+    pub(crate) fn over(&self, other: &Self) -> f64 {
         ratio(&self.squares, &other.squares)
     }
 
     /// Root of the mean square of an output, and how much of its standard deviation it is short of, in percent.
-    pub fn figure(&self, output: usize) -> (f64, f64) {
+    pub(crate) fn figure(&self, output: usize) -> (f64, f64) {
         let (square, variance) = (self.squares[output], self.variances[output]);
         let part = (square / variance.max(f64::MIN_POSITIVE)).sqrt();
         (square.sqrt(), 100.0 * (1.0 - part))
     }
 
     /// The part of the mean square of another that is gone, the geometric mean over outputs.
-    pub fn removed(&self, other: &Self) -> f64 {
+    pub(crate) fn removed(&self, other: &Self) -> f64 {
         1.0 - self.over(other).powi(2)
     }
 
     /// Whether free runs follow the recordings clearly better than their means do.
-    pub fn follows(&self) -> bool {
+    pub(crate) fn follows(&self) -> bool {
         ratio(&self.squares, &self.variances) < FOLLOWS
     }
 }

@@ -82,8 +82,8 @@ pub(crate) enum MemoryStart {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Memory {
     /// Its derivative.
-    pub rate: &'static str,
-    pub start: MemoryStart,
+    pub(crate) rate: &'static str,
+    pub(crate) start: MemoryStart,
 }
 
 /// What stands for the memories in a form.
@@ -93,30 +93,30 @@ pub(crate) const MEMORIES: [&str; 2] = ["{m}", "{p}"];
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Shape {
     /// As in the form: `from` for `{from}`. Not the symbol of the strength.
-    pub symbol: &'static str,
-    pub starts: Starts,
+    pub(crate) symbol: &'static str,
+    pub(crate) starts: Starts,
     /// True when only positive values make sense.
-    pub positive: bool,
+    pub(crate) positive: bool,
 }
 
 /// A term.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Term {
     /// Id where nothing more is known of the place; see [`named`](super::names::named).
-    pub id: &'static str,
-    pub port: Port,
-    pub needs: Needs,
+    pub(crate) id: &'static str,
+    pub(crate) port: Port,
+    pub(crate) needs: Needs,
     /// Function of `{z}`, of the shapes, and of the memories; the strength is its factor. `{v}` is what stands at the place,
     /// `{a}` the factor of the derivative there.
-    pub form: &'static str,
-    pub memories: &'static [Memory],
-    pub shapes: &'static [Shape],
+    pub(crate) form: &'static str,
+    pub(crate) memories: &'static [Memory],
+    pub(crate) shapes: &'static [Shape],
     /// False when the size of the term is fixed by its shapes: `{v}` becomes the form itself.
-    pub free_strength: bool,
+    pub(crate) free_strength: bool,
     /// Symbol of its strength.
-    pub symbol: &'static str,
+    pub(crate) symbol: &'static str,
     /// Units of the parameters that it may enter; none: all.
-    pub units: &'static [&'static str],
+    pub(crate) units: &'static [&'static str],
 }
 
 const fn shape(symbol: &'static str, starts: Starts, positive: bool) -> Shape {

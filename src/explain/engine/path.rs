@@ -21,9 +21,9 @@ pub(super) struct Path {
 /// Places with the columns of the hooks that enter there.
 pub(super) struct Hooked {
     plant: Plant,
-    pub places: Vec<Place>,
+    pub(super) places: Vec<Place>,
     /// Input of the hooked plant for each place.
-    pub columns: Vec<usize>,
+    pub(super) columns: Vec<usize>,
 }
 
 pub(super) fn hooked(
@@ -135,7 +135,7 @@ pub(super) fn path(
 
 impl Path {
     /// Change of the outputs by a signal that enters at a hook.
-    pub fn propagate(
+    pub(crate) fn propagate(
         &self,
         column: usize,
         signal: &[Vec<f64>],

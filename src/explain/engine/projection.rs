@@ -33,7 +33,7 @@ pub(super) struct Tested {
 }
 
 impl Projection {
-    pub fn new(study: &Study, fit: &Fit) -> Option<Self> {
+    pub(crate) fn new(study: &Study, fit: &Fit) -> Option<Self> {
         let mut q = study.derivatives(fit)?;
         let mut norms = Vec::new();
         for mut column in q.column_iter_mut() {
@@ -75,7 +75,7 @@ impl Projection {
     }
 
     /// Projects parameters and initial states off; the products with their directions.
-    pub fn off(&self, column: &mut [f64]) -> DVector<f64> {
+    pub(super) fn off(&self, column: &mut [f64]) -> DVector<f64> {
         let products = self.q.column_iter().map(|q| {
             let along: f64 = q.iter().zip(column.iter()).map(|(q, c)| q * c).sum();
             column
@@ -88,7 +88,7 @@ impl Projection {
     }
 
     /// Tests a whitened column; none where parameters can do the same.
-    pub fn test(&self, mut column: Vec<f64>, free: bool) -> Option<Tested> {
+    pub(crate) fn test(&self, mut column: Vec<f64>, free: bool) -> Option<Tested> {
         let square = |c: &[f64]| c.iter().map(|v| v * v).sum::<f64>();
         let before = square(&column);
         let products = self.off(&mut column);

@@ -10,11 +10,11 @@ use crate::physics::{ModelSpec, nearest};
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Scope {
     /// Nothing else is tried, unless empty.
-    pub only: Vec<String>,
+    pub(crate) only: Vec<String>,
     /// What is not tried.
-    pub without: Vec<String>,
+    pub(crate) without: Vec<String>,
     /// What the user holds possible.
-    pub hypotheses: Vec<Hypothesis>,
+    pub(crate) hypotheses: Vec<Hypothesis>,
 }
 
 /// An id that the library does not have.
@@ -34,7 +34,7 @@ pub struct UnknownPlantEffect {
 
 impl Scope {
     /// Checks that every id is known.
-    pub fn new(only: &[String], without: &[String]) -> Result<Self, UnknownPlantEffect> {
+    pub(crate) fn new(only: &[String], without: &[String]) -> Result<Self, UnknownPlantEffect> {
         let ids = || PLANT_EFFECTS.iter().map(|e| e.id);
         for (option, given) in [("--only", only), ("--without", without)] {
             if let Some(id) = given.iter().find(|id| !ids().any(|known| known == *id)) {
@@ -54,13 +54,13 @@ impl Scope {
     }
 
     /// Whether this id may be named.
-    pub fn allows(&self, id: &str) -> bool {
+    pub(crate) fn allows(&self, id: &str) -> bool {
         (self.only.is_empty() || self.only.iter().any(|o| o == id))
             && !self.without.iter().any(|w| w == id)
     }
 
     /// Drops what may not be named. The tests of what is left are made of all terms all the same.
-    pub fn restrict(&self, spec: &ModelSpec, screen: &mut Screen) {
+    pub(crate) fn restrict(&self, spec: &ModelSpec, screen: &mut Screen) {
         if self.only.is_empty() && self.without.is_empty() {
             return;
         }

@@ -36,21 +36,21 @@ const LEAST_PERIODS: f64 = 3.0;
 /// A term at a place, with the values of its shapes that the test liked best.
 #[derive(Debug, Clone)]
 pub(crate) struct Lead {
-    pub term: &'static Term,
-    pub place: Place,
+    pub(crate) term: &'static Term,
+    pub(crate) place: Place,
     /// The place is a sensor's equation.
-    pub sensor: bool,
+    pub(crate) sensor: bool,
     /// Place in the arguments; none for functions of time.
-    pub argument: Option<usize>,
-    pub shapes: Vec<f64>,
+    pub(crate) argument: Option<usize>,
+    pub(crate) shapes: Vec<f64>,
     /// Strength that the regression gives.
     pub strength: f64,
     /// What the regression adds to the numbers of the fit beside it; empty where that is not known.
     pub shift: Vec<f64>,
     /// Decrease of the deviance that it foretells.
-    pub statistic: f64,
+    pub(crate) statistic: f64,
     /// What stands for the form of a curve.
-    pub curve: Option<Curve>,
+    pub(crate) curve: Option<Curve>,
     /// Products of its column with a few columns of noise: two terms that do the same to the recording have the same.
     signature: [f64; SIGNATURE],
 }
@@ -99,12 +99,12 @@ impl Lead {
 
 /// Leads, best first, and what they depend on.
 pub(crate) struct Screen {
-    pub leads: Vec<Lead>,
+    pub(crate) leads: Vec<Lead>,
     /// Curves at the best places, best first.
-    pub curves: Vec<Lead>,
+    pub(crate) curves: Vec<Lead>,
     /// Number of tests.
-    pub tests: usize,
-    pub arguments: Vec<Argument>,
+    pub(crate) tests: usize,
+    pub(crate) arguments: Vec<Argument>,
 }
 
 /// Tests every term at every place that the given plant has; what effects have added to it is neither place nor argument.

@@ -71,23 +71,23 @@ const MOST: usize = 2;
 
 /// What the search has found.
 pub(crate) struct Found {
-    pub given: Plant,
-    pub baseline: Fit,
+    pub(crate) given: Plant,
+    pub(crate) baseline: Fit,
     /// Effects in the order in which they were added, each with its rivals, best first.
-    pub steps: Vec<Vec<Fitted>>,
+    pub(crate) steps: Vec<Vec<Fitted>>,
     /// The strongest test before the first effect, after it, and so on, and how many there were.
-    pub tests: Vec<(f64, usize)>,
+    pub(crate) tests: Vec<(f64, usize)>,
     /// The plant with everything that was accepted, its fit, and the covariance of its numbers.
-    pub plant: Plant,
-    pub fit: Fit,
-    pub accepted: usize,
+    pub(crate) plant: Plant,
+    pub(crate) fit: Fit,
+    pub(crate) accepted: usize,
     /// What the recordings say about each hypothesis.
-    pub trials: Vec<Trial>,
-    pub options: EstimateOptions,
+    pub(crate) trials: Vec<Trial>,
+    pub(crate) options: EstimateOptions,
     /// Information in a value of what the fit leaves, as a part of that in a value with independent noise.
-    pub information: f64,
+    pub(crate) information: f64,
     /// Free runs in blocks that the fit had not seen, without and with the effects; none where the plant does not run freely.
-    pub held_out: Option<[HeldOut; 2]>,
+    pub(crate) held_out: Option<[HeldOut; 2]>,
 }
 
 /// What fits are compared by.
@@ -101,12 +101,12 @@ pub(crate) enum Objective {
 
 impl Found {
     /// The strongest test at the end, and how many there were.
-    pub fn left(&self) -> (f64, usize) {
+    pub(crate) fn left(&self) -> (f64, usize) {
         self.tests.get(self.accepted).copied().unwrap_or_default()
     }
 
     /// The plant with so many effects, and its fit.
-    pub fn stage(&self, accepted: usize) -> (&Plant, &Fit) {
+    pub(crate) fn stage(&self, accepted: usize) -> (&Plant, &Fit) {
         match accepted.checked_sub(1) {
             _ if accepted == self.accepted => (&self.plant, &self.fit),
             None => (&self.given, &self.baseline),
@@ -118,7 +118,7 @@ impl Found {
     }
 
     /// Drops all effects but the first `accepted`.
-    pub fn keep(&mut self, accepted: usize) {
+    pub(crate) fn keep(&mut self, accepted: usize) {
         if accepted >= self.accepted {
             return;
         }

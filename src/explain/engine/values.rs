@@ -99,9 +99,9 @@ pub(crate) fn filled(
 
 /// A term at an argument with shapes, whose values are asked for.
 pub(super) struct Instance {
-    pub term: &'static Term,
-    pub argument: Option<usize>,
-    pub shapes: Vec<f64>,
+    pub(super) term: &'static Term,
+    pub(super) argument: Option<usize>,
+    pub(super) shapes: Vec<f64>,
 }
 
 /// Values of terms along the recordings.
@@ -169,7 +169,7 @@ pub(super) fn evaluate(
 
 impl MemoryStart {
     /// The start where the argument has this value.
-    pub fn at(self, argument: f64) -> f64 {
+    pub(crate) fn at(self, argument: f64) -> f64 {
         match self {
             Self::Argument => argument,
             Self::Square => argument * argument,

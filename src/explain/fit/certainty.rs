@@ -9,16 +9,16 @@ use super::{Fit, Problem};
 #[derive(Debug, Clone)]
 pub(crate) struct Certainty {
     /// Covariance of the numbers; those that move nothing have none.
-    pub covariance: DMatrix<f64>,
+    pub(crate) covariance: DMatrix<f64>,
     /// How far the two halves of the recordings disagree about each number, in standard deviations of the difference:
     /// one Gauss-Newton step of each half from the common optimum, which is as good as a fit of each (one-step
     /// estimation, Le Cam 1956). Numbers that move nothing disagree by zero. None where a half does not determine all.
-    pub halves_disagree: Option<Vec<f64>>,
+    pub(crate) halves_disagree: Option<Vec<f64>>,
 }
 
 impl Fit {
     /// How well the numbers are known.
-    pub fn certainty(&mut self, problem: &Problem) -> Option<Certainty> {
+    pub(crate) fn certainty(&mut self, problem: &Problem) -> Option<Certainty> {
         let mut slopes = self.sensitivities(problem);
         let held = self.structure.held();
         for (i, slope) in slopes.iter_mut().enumerate() {

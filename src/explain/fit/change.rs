@@ -18,7 +18,12 @@ const OUTSIDE: f64 = 1e-3;
 impl Fit {
     /// Replaces the variance of the time of change `at` in `covariance` by that of its posterior, the other numbers held;
     /// correlations stay.
-    pub fn ask_all_times(&self, problem: &Problem, covariance: &mut DMatrix<f64>, at: usize) {
+    pub(crate) fn ask_all_times(
+        &self,
+        problem: &Problem,
+        covariance: &mut DMatrix<f64>,
+        at: usize,
+    ) {
         let linearised = covariance[(at, at)].max(0.0).sqrt();
         let asked = self.spread_of_time(problem, at);
         let ratio = asked / linearised;

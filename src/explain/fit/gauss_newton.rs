@@ -19,7 +19,7 @@ pub(super) struct Jacobian {
 
 impl Jacobian {
     /// Of `slopes`, a series a number; none when no number moves anything.
-    pub fn new(problem: &Problem, noise: &Noise, slopes: &[Option<Series>]) -> Option<Self> {
+    pub(crate) fn new(problem: &Problem, noise: &Noise, slopes: &[Option<Series>]) -> Option<Self> {
         let rows = problem.count();
         let used: Vec<usize> = (0..slopes.len()).filter(|i| slopes[*i].is_some()).collect();
         if used.is_empty() {
@@ -38,7 +38,7 @@ impl Jacobian {
 
     /// Broyden's (1965) least change, each number on the scale of its own column, after which the derivatives foretell
     /// what `step` has just done.
-    pub fn update(
+    pub(crate) fn update(
         &mut self,
         problem: &Problem,
         noise: &Noise,
@@ -66,12 +66,12 @@ impl Jacobian {
 
     /// The whitened columns, of the values that count.
     #[cfg(test)]
-    pub fn columns(&self) -> &DMatrix<f64> {
+    pub(crate) fn columns(&self) -> &DMatrix<f64> {
         &self.columns
     }
 
     /// The weighted least-squares system at `residual`, of all rows or of those that `only` lets pass.
-    pub fn normal_equations(
+    pub(crate) fn normal_equations(
         &self,
         problem: &Problem,
         noise: &Noise,
@@ -142,7 +142,7 @@ impl NormalEquations {
     }
 
     /// Inverse of the curvature, for all numbers.
-    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+    pub(crate) fn covariance(&self) -> Option<DMatrix<f64>> {
         let inverse = self.factor(0.0)?.inverse();
         let mut covariance = DMatrix::zeros(self.total, self.total);
         for (i, &a) in self.used.iter().enumerate() {
@@ -154,7 +154,7 @@ impl NormalEquations {
     }
 
     /// The damped step.
-    pub fn step(&self, damping: f64) -> Option<DVector<f64>> {
+    pub(crate) fn step(&self, damping: f64) -> Option<DVector<f64>> {
         let solved = self.factor(damping)?.solve(&self.gradient);
         let mut step = DVector::zeros(self.total);
         for (i, &at) in self.used.iter().enumerate() {

@@ -19,7 +19,12 @@ const DOUBLINGS: i32 = 12;
 
 impl Fit {
     /// Narrows the variances of the numbers `which` in `covariance` where the recording objects to them; correlations stay.
-    pub fn narrow(&self, problem: &Problem, covariance: &mut DMatrix<f64>, which: Range<usize>) {
+    pub(crate) fn narrow(
+        &self,
+        problem: &Problem,
+        covariance: &mut DMatrix<f64>,
+        which: Range<usize>,
+    ) {
         for i in which {
             let std = covariance[(i, i)].max(0.0).sqrt();
             if std == 0.0 || !std.is_finite() || !self.objects(problem, covariance, i) {

@@ -40,7 +40,7 @@ impl Nudge {
 
 impl Fit {
     /// Change of the simulation with each number: a series a number, and none for one that moves nothing.
-    pub fn sensitivities(&mut self, problem: &Problem) -> Vec<Option<Series>> {
+    pub(crate) fn sensitivities(&mut self, problem: &Problem) -> Vec<Option<Series>> {
         let bounds = self.structure.bounds();
         let held = self.structure.held();
         let mut steps = std::mem::take(&mut self.steps);

@@ -49,32 +49,32 @@ const SIDES: [&str; 3] = ["coulomb_friction", "stribeck_friction", "input_dead_z
 /// What the averaged equation adds to a finding.
 #[derive(Debug, Clone)]
 pub(crate) struct Proof {
-    pub equation: Equation,
-    pub tethered: Tethered,
+    pub(crate) equation: Equation,
+    pub(crate) tethered: Tethered,
     /// Decrease of twice the negative log likelihood on held-out windows.
-    pub heldout_gain: Option<f64>,
+    pub(crate) heldout_gain: Option<f64>,
     /// Largest difference of the law's coefficients between the halves, in standard deviations.
-    pub halves_disagree: Option<f64>,
-    pub adequacy: Option<Adequacy>,
-    pub adequate: bool,
+    pub(crate) halves_disagree: Option<f64>,
+    pub(crate) adequacy: Option<Adequacy>,
+    pub(crate) adequate: bool,
     /// What the little that is left resembles, with its evidence.
-    pub resembles: Option<(&'static Definition, f64)>,
+    pub(crate) resembles: Option<(&'static Definition, f64)>,
     /// Half length of the windows in samples.
-    pub half: usize,
+    pub(crate) half: usize,
     /// Whether a spring brings the mass back well within the recording: it is no drive, and its free run forgets.
-    pub is_brought_back: bool,
+    pub(crate) is_brought_back: bool,
 }
 
 impl Proof {
     /// Root mean square free-run error of each half of the recordings when the other half is fitted; `None` where a half
     /// does not determine the coefficients.
-    pub fn error_across_halves(&self, problem: &Problem) -> Option<f64> {
+    pub(crate) fn error_across_halves(&self, problem: &Problem) -> Option<f64> {
         let windows = Windows::choose(problem.data, self.equation.reading)?;
         error_across_halves(&self.equation, &windows, problem.data, problem)
     }
 
     /// Whether any error of a free run adds up: the position of a mass is measured, which no spring brings back.
-    pub fn drifts(&self) -> bool {
+    pub(crate) fn drifts(&self) -> bool {
         self.equation.reading == Reading::Position && !self.is_brought_back
     }
 }

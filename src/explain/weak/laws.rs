@@ -14,7 +14,7 @@ const INPUT_TOLERANCE: f64 = 0.3;
 /// One law of the library, as columns.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Form {
-    pub definition: &'static Definition,
+    pub(crate) definition: &'static Definition,
     kind: Kind,
 }
 
@@ -51,7 +51,7 @@ const FORMS: &[(&str, &str, Kind)] = &[
 
 impl Form {
     /// All that can be asked with this reading: without a measured position there are no laws of it.
-    pub fn all(reading: Reading, allowed: &dyn Fn(&Definition) -> bool) -> Vec<Self> {
+    pub(crate) fn all(reading: Reading, allowed: &dyn Fn(&Definition) -> bool) -> Vec<Self> {
         FORMS
             .iter()
             .filter_map(|(id, variant, kind)| {
@@ -75,12 +75,12 @@ impl Form {
     }
 
     /// Whether the law changes the input instead of adding a force.
-    pub fn on_input(&self) -> bool {
+    pub(crate) fn on_input(&self) -> bool {
         matches!(self.kind, Kind::DeadZone | Kind::Saturation)
     }
 
     /// Numbers of shape that are tried; a single zero for a law without one.
-    pub fn shapes(&self, windows: &Windows, start: f64, step: f64) -> Vec<f64> {
+    pub(crate) fn shapes(&self, windows: &Windows, start: f64, step: f64) -> Vec<f64> {
         let input = |q: f64| quantile(windows.input.iter().flatten().map(|u| u.abs()), q);
         match self.kind {
             Kind::Stribeck => [0.01, 0.02, 0.05, 0.1, 0.2, 0.4]
@@ -109,7 +109,7 @@ impl Form {
     }
 
     /// Whether a number of shape is fitted.
-    pub fn has_shape(&self) -> bool {
+    pub(crate) fn has_shape(&self) -> bool {
         matches!(
             self.kind,
             Kind::Stribeck | Kind::Cogging | Kind::Load | Kind::DeadZone | Kind::Saturation
@@ -118,7 +118,7 @@ impl Form {
 
     /// Numbers that the law owes beside its coefficients: a shape; one chosen among many pitches or times counts
     /// about twice (Djuric 1996; Zhang and Siegmund 2007).
-    pub fn owed(&self) -> usize {
+    pub(crate) fn owed(&self) -> usize {
         match self.kind {
             Kind::Cogging | Kind::Load => 2,
             _ => usize::from(self.has_shape()),
@@ -126,7 +126,7 @@ impl Form {
     }
 
     /// The law's force against the motion at unit coefficients, averaged over the windows.
-    pub fn columns(&self, w: &Windows, shape: f64, start: f64, step: f64) -> Vec<Vec<f64>> {
+    pub(crate) fn columns(&self, w: &Windows, shape: f64, start: f64, step: f64) -> Vec<Vec<f64>> {
         let x = |s: usize, k: usize| w.position[s][k];
         let v = |s: usize, k: usize| w.rate[s][k];
         let u = |s: usize, k: usize| w.input[s][k];
@@ -163,7 +163,7 @@ impl Form {
     }
 
     /// Whether the coefficients are physical; `side` is the sign of the mass (an input may be wired in reverse).
-    pub fn is_physical(&self, coefficients: &[f64], side: f64) -> bool {
+    pub(crate) fn is_physical(&self, coefficients: &[f64], side: f64) -> bool {
         match self.kind {
             Kind::Coulomb | Kind::Drag => coefficients[0] * side > 0.0,
             Kind::Stribeck => coefficients.iter().all(|c| c * side > 0.0),
@@ -173,7 +173,7 @@ impl Form {
     }
 
     /// Amplitude and shape parameters in the library's order.
-    pub fn numbers(&self, coefficients: &[f64], shape: f64) -> (f64, Vec<f64>) {
+    pub(crate) fn numbers(&self, coefficients: &[f64], shape: f64) -> (f64, Vec<f64>) {
         match self.kind {
             Kind::Stribeck => {
                 let excess = coefficients[1] / coefficients[0];

@@ -16,11 +16,11 @@ use crate::linalg::exponential;
 /// `u = M a + d v + F0 [+ k x] + laws`.
 #[derive(Debug, Clone)]
 pub(crate) struct Equation {
-    pub reading: Reading,
+    pub(crate) reading: Reading,
     /// Whether a linear spring is in it.
-    pub spring: bool,
+    pub(crate) spring: bool,
     /// Laws with their number of shape.
-    pub laws: Vec<(Form, f64)>,
+    pub(crate) laws: Vec<(Form, f64)>,
 }
 
 /// Coefficients before those of the spring and the laws: mass, viscous friction, constant force.
@@ -33,7 +33,7 @@ const POINTS: i32 = 4;
 impl Equation {
     /// Least squares over the windows. With `ranking`, laws on the input have a coefficient of their own, which must
     /// come out near one; else they are what they are.
-    pub fn fit(&self, windows: &Windows, data: &Data, ranking: bool) -> Option<Regression> {
+    pub(crate) fn fit(&self, windows: &Windows, data: &Data, ranking: bool) -> Option<Regression> {
         let (target, columns) = self.system(windows, data, ranking);
         let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         Regression::new(&columns, &target)
@@ -41,7 +41,7 @@ impl Equation {
 
     /// The acceleration from input, rate, constant, spring, laws and further columns: what the noise of the sensor is in is
     /// then the target, and no column can take the place of the input.
-    pub fn fit_motion(
+    pub(crate) fn fit_motion(
         &self,
         windows: &Windows,
         data: &Data,
@@ -55,7 +55,7 @@ impl Equation {
     }
 
     /// Errors of given coefficients (as of [`Equation::fit`] without `ranking`) on windows.
-    pub fn errors(&self, windows: &Windows, data: &Data, coefficients: &[f64]) -> Vec<f64> {
+    pub(crate) fn errors(&self, windows: &Windows, data: &Data, coefficients: &[f64]) -> Vec<f64> {
         let (target, columns) = self.system(windows, data, false);
         (0..target.len())
             .map(|i| {
@@ -93,7 +93,7 @@ impl Equation {
     }
 
     /// Where the coefficients of each law begin, and how many they are.
-    pub fn places(&self, ranking: bool) -> Vec<(usize, usize)> {
+    pub(crate) fn places(&self, ranking: bool) -> Vec<(usize, usize)> {
         let mut at = PLAIN + usize::from(self.spring);
         self.laws
             .iter()
@@ -110,14 +110,14 @@ impl Equation {
     }
 
     /// Numbers that the equation owes in all.
-    pub fn owed(&self, regression: &Regression) -> f64 {
+    pub(crate) fn owed(&self, regression: &Regression) -> f64 {
         let shapes: usize = self.laws.iter().map(|(form, _)| form.owed()).sum();
         (regression.coefficients.len() + shapes) as f64
     }
 
     /// Whether the mass is one, a spring pulls back (a drive that topples would not have been recorded for long), and
     /// the laws are physical.
-    pub fn is_physical(&self, regression: &Regression) -> bool {
+    pub(crate) fn is_physical(&self, regression: &Regression) -> bool {
         let c = &regression.coefficients;
         let side = c[0].signum();
         c[0] != 0.0
@@ -133,7 +133,7 @@ impl Equation {
 
     /// Time in seconds in which the slowest free motion of the position decays to `1/e`, without the laws: infinite without a
     /// spring, for a mass then stays where it was pushed.
-    pub fn forgets_after(&self, coefficients: &[f64]) -> f64 {
+    pub(crate) fn forgets_after(&self, coefficients: &[f64]) -> f64 {
         if !self.spring {
             return f64::INFINITY;
         }
@@ -149,7 +149,7 @@ impl Equation {
     }
 
     /// The last law's shape moved to where it fits best, within `width` (a factor) of what it is.
-    pub fn refined(mut self, windows: &Windows, data: &Data, width: f64) -> Self {
+    pub(crate) fn refined(mut self, windows: &Windows, data: &Data, width: f64) -> Self {
         let Some(last) = self.laws.len().checked_sub(1) else {
             return self;
         };
@@ -182,7 +182,7 @@ impl Equation {
 
     /// The plant with its laws, from the coefficients and the initial position and rate of each segment; and its
     /// numbers. The second input is the constant 1.
-    pub fn structure(
+    pub(crate) fn structure(
         &self,
         coefficients: &[f64],
         starts: &[[f64; 2]],

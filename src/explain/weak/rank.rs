@@ -11,10 +11,10 @@ use super::windows::Windows;
 /// An equation with its fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
-    pub equation: Equation,
-    pub regression: Regression,
+    pub(crate) equation: Equation,
+    pub(crate) regression: Regression,
     /// Schwarz's criterion, smaller is better.
-    pub criterion: f64,
+    pub(crate) criterion: f64,
 }
 
 /// Neighbours of a grid of shapes are about this factor apart.

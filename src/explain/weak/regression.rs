@@ -12,17 +12,17 @@ const LAGS_SHARE: usize = 4;
 /// `target = columns c + error`.
 #[derive(Debug, Clone)]
 pub(crate) struct Regression {
-    pub coefficients: DVector<f64>,
+    pub(crate) coefficients: DVector<f64>,
     /// Inverse of the Gram matrix.
-    pub inverse: DMatrix<f64>,
-    pub residual: Vec<f64>,
+    pub(crate) inverse: DMatrix<f64>,
+    pub(crate) residual: Vec<f64>,
     /// Sum of squared errors.
-    pub squares: f64,
+    pub(crate) squares: f64,
 }
 
 impl Regression {
     /// Least squares; `None` where the columns are dependent.
-    pub fn new(columns: &[&[f64]], target: &[f64]) -> Option<Self> {
+    pub(crate) fn new(columns: &[&[f64]], target: &[f64]) -> Option<Self> {
         let (n, m) = (target.len(), columns.len());
         if n <= m {
             return None;
@@ -54,18 +54,18 @@ impl Regression {
     }
 
     /// Number of independent windows that the errors amount to: `N / sum rho^2` (Bartlett 1946).
-    pub fn effective(&self) -> f64 {
+    pub(crate) fn effective(&self) -> f64 {
         effective(&self.residual)
     }
 
     /// Sum of squared errors of the motion: over the square of the first coefficient, which is the mass. Laws that change
     /// the input change what the errors of the force are measured in; those of the acceleration stay the same.
-    pub fn motion_squares(&self) -> f64 {
+    pub(crate) fn motion_squares(&self) -> f64 {
         self.squares / self.coefficients[0].powi(2).max(1e-300)
     }
 
     /// Covariance of the coefficients, with as many windows as are independent.
-    pub fn covariance(&self) -> DMatrix<f64> {
+    pub(crate) fn covariance(&self) -> DMatrix<f64> {
         let n = self.residual.len() as f64;
         let free = (n - self.coefficients.len() as f64).max(1.0);
         &self.inverse * (self.squares / free * (n / self.effective()).max(1.0))

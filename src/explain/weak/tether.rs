@@ -26,10 +26,10 @@ const REST: f64 = 3.0;
 /// A tethered fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Tethered {
-    pub coefficients: Vec<f64>,
-    pub covariance: DMatrix<f64>,
+    pub(crate) coefficients: Vec<f64>,
+    pub(crate) covariance: DMatrix<f64>,
     /// Position and rate at the start of each segment.
-    pub starts: Vec<[f64; 2]>,
+    pub(crate) starts: Vec<[f64; 2]>,
 }
 
 /// Position and rate at the start, each with its variance: a parabola through the first samples; at rest when that

@@ -35,26 +35,26 @@ const MOST_STANDING: f64 = 0.3;
 /// The recording as rows of the averaged equation of motion.
 #[derive(Debug, Clone)]
 pub(crate) struct Windows {
-    pub reading: Reading,
+    pub(crate) reading: Reading,
     /// Half length in samples.
-    pub half: usize,
+    pub(crate) half: usize,
     /// Segment and middle sample of each row.
-    pub places: Vec<(usize, usize)>,
+    pub(crate) places: Vec<(usize, usize)>,
     /// Averaged input.
-    pub force: Vec<f64>,
+    pub(crate) force: Vec<f64>,
     /// Averaged acceleration and rate.
-    pub acceleration: Vec<f64>,
-    pub speed: Vec<f64>,
+    pub(crate) acceleration: Vec<f64>,
+    pub(crate) speed: Vec<f64>,
     /// Position at each sample of each segment, where it is what is read (no law of it is asked about elsewhere), and the
     /// smoothed rate.
-    pub position: Vec<Vec<f64>>,
-    pub rate: Vec<Vec<f64>>,
+    pub(crate) position: Vec<Vec<f64>>,
+    pub(crate) rate: Vec<Vec<f64>>,
     /// Input that acted about each sample: held from sample to sample, so the mean of the two values next to it.
-    pub input: Vec<Vec<f64>>,
+    pub(crate) input: Vec<Vec<f64>>,
     /// Size of a quick motion: the 90 % quantile of the rate.
-    pub quick: f64,
+    pub(crate) quick: f64,
     /// Share by which the sensor's noise lowers the coefficients of acceleration and rate, about.
-    pub attenuation: [f64; 2],
+    pub(crate) attenuation: [f64; 2],
     bump: Vec<f64>,
 }
 
@@ -208,7 +208,7 @@ pub(crate) fn quantile(values: impl Iterator<Item = f64>, q: f64) -> f64 {
 
 impl Windows {
     /// The shortest windows over which the sensor's noise hardly matters; `None` when there are none short enough.
-    pub fn choose(data: &Data, reading: Reading) -> Option<Self> {
+    pub(crate) fn choose(data: &Data, reading: Reading) -> Option<Self> {
         let noise = sensor_noise(data);
         let mut half = SHORTEST;
         while data.samples() / half >= LEAST_WINDOWS {
@@ -291,7 +291,7 @@ impl Windows {
     }
 
     /// A quantity given at each sample, averaged over the windows. Neighbours overlap: what they share is asked for once.
-    pub fn average(&self, of: impl Fn(usize, usize) -> f64) -> Vec<f64> {
+    pub(crate) fn average(&self, of: impl Fn(usize, usize) -> f64) -> Vec<f64> {
         let mut held: Vec<f64> = Vec::with_capacity(self.bump.len());
         let mut held_from = (usize::MAX, 0);
         self.places
@@ -312,7 +312,7 @@ impl Windows {
     }
 
     /// The windows that `keep` (segment, middle sample) names.
-    pub fn only(&self, keep: impl Fn(usize, usize) -> bool) -> Self {
+    pub(crate) fn only(&self, keep: impl Fn(usize, usize) -> bool) -> Self {
         let kept: Vec<usize> = (0..self.places.len())
             .filter(|&i| keep(self.places[i].0, self.places[i].1))
             .collect();

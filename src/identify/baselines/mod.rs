@@ -24,8 +24,8 @@ use crate::linalg::{
 };
 use crate::model::StateSpace;
 
-pub use n4sid::n4sid;
-pub use subid::subid;
+pub(crate) use n4sid::n4sid;
+pub(crate) use subid::subid;
 pub use table_two::TableTwo;
 
 /// Weights of the singular value decomposition of the oblique projection.
@@ -33,7 +33,7 @@ pub use table_two::TableTwo;
     Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
 )]
 #[serde(rename_all = "lowercase")]
-pub enum ProjectionWeight {
+pub(crate) enum ProjectionWeight {
     /// `W1 = I`, `W2 = Pi` (perpendicular to the future inputs): MOESP, and the default of subid (there called SV).
     #[default]
     Moesp,
@@ -43,13 +43,13 @@ pub enum ProjectionWeight {
 
 /// A model with its noise, in the units of the regression.
 #[derive(Debug, Clone, PartialEq)]
-pub struct BaselineEstimate {
+pub(crate) struct BaselineEstimate {
     /// The system.
-    pub system: StateSpace,
+    pub(crate) system: StateSpace,
     /// Covariance of the innovations.
-    pub innovation_covariance: DMatrix<f64>,
+    pub(crate) innovation_covariance: DMatrix<f64>,
     /// Singular values of the weighted projection.
-    pub singular_values: Vec<f64>,
+    pub(crate) singular_values: Vec<f64>,
 }
 
 /// `Gamma_h` of order `n` from the weighted oblique projection `W1 Theta_p W_p W2`, with the singular values.

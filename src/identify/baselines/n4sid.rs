@@ -25,7 +25,7 @@ const BLOCK: usize = 4096;
 ///
 /// # Errors
 /// [`IdentifyError::Order`], or [`IdentifyError::Linalg`] for singular regressions.
-pub fn n4sid(
+pub(crate) fn n4sid(
     regression: &Regression,
     experiments: &[&Signals],
     order: usize,

@@ -18,7 +18,7 @@ const DEPENDENT: f64 = 1e-12;
 /// # Errors
 /// [`IdentifyError::Horizon`] unless past and future window have the same length of at least two,
 /// [`IdentifyError::Order`], or [`IdentifyError::Linalg`] for singular regressions.
-pub fn subid(
+pub(crate) fn subid(
     regression: &Regression,
     order: usize,
     weight: ProjectionWeight,

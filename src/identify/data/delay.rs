@@ -2,7 +2,7 @@
 
 /// Aligns `y[k]` with `u_i[k - d_i]`. The first `max d_i` samples have no complete partner and are dropped.
 #[derive(Debug)]
-pub struct Aligner {
+pub(crate) struct Aligner {
     /// Samples still to be dropped from each channel.
     skip: Vec<usize>,
     pending: Vec<Vec<f64>>,
@@ -11,7 +11,7 @@ pub struct Aligner {
 
 impl Aligner {
     /// `delays`: one an input; `outputs`: number of outputs, which follow the inputs.
-    pub fn new(delays: &[usize], outputs: usize) -> Self {
+    pub(crate) fn new(delays: &[usize], outputs: usize) -> Self {
         let longest = delays.iter().copied().max().unwrap_or(0);
         let skip: Vec<usize> = delays
             .iter()
@@ -26,7 +26,7 @@ impl Aligner {
     }
 
     /// Passes on what is complete.
-    pub fn push(&mut self, columns: &[&[f64]], sink: &mut dyn FnMut(&[&[f64]])) {
+    pub(crate) fn push(&mut self, columns: &[&[f64]], sink: &mut dyn FnMut(&[&[f64]])) {
         if self.aligned {
             sink(columns);
             return;
@@ -49,15 +49,15 @@ impl Aligner {
 
 /// Collects what an [`Aligner`] passes on, one column a channel.
 #[derive(Debug)]
-pub struct AlignedColumns {
+pub(crate) struct AlignedColumns {
     aligner: Aligner,
     /// The samples so far.
-    pub columns: Vec<Vec<f64>>,
+    pub(crate) columns: Vec<Vec<f64>>,
 }
 
 impl AlignedColumns {
     /// `delays`: one an input; `outputs`: number of outputs, which follow the inputs.
-    pub fn new(delays: &[usize], outputs: usize) -> Self {
+    pub(crate) fn new(delays: &[usize], outputs: usize) -> Self {
         Self {
             aligner: Aligner::new(delays, outputs),
             columns: vec![Vec::new(); delays.len() + outputs],
@@ -65,7 +65,7 @@ impl AlignedColumns {
     }
 
     /// Adds a block of samples.
-    pub fn push(&mut self, block: &[&[f64]]) {
+    pub(crate) fn push(&mut self, block: &[&[f64]]) {
         let columns = &mut self.columns;
         self.aligner.push(block, &mut |part| {
             for (column, part) in columns.iter_mut().zip(part) {

@@ -11,7 +11,7 @@ use crate::moments::{RFactor, Trend};
 
 /// The recordings behind an identification. Factors come from moments that are already in memory, so asking for
 /// one costs no reading (unless the moments are too ill-conditioned, see [`RFactor`]), and each is made once.
-pub struct Source<'a> {
+pub(crate) struct Source<'a> {
     data: &'a Data,
     records: &'a mut dyn Records,
     factors: Vec<Arc<RFactor>>,
@@ -57,7 +57,7 @@ impl<'a> Source<'a> {
     ///
     /// # Errors
     /// [`IdentifyError::TooShort`] when no window fits into the recordings, or when reading again fails.
-    pub fn factor(&mut self, past: usize) -> Result<Arc<RFactor>, IdentifyError> {
+    pub(crate) fn factor(&mut self, past: usize) -> Result<Arc<RFactor>, IdentifyError> {
         if let Some(known) = self.factors.iter().find(|f| f.past == past) {
             return Ok(Arc::clone(known));
         }
@@ -76,7 +76,7 @@ impl<'a> Source<'a> {
     }
 
     /// The factors of all data but one block, for each block of the jackknife.
-    pub fn factors_without_blocks(&self, past: usize) -> Vec<RFactor> {
+    pub(crate) fn factors_without_blocks(&self, past: usize) -> Vec<RFactor> {
         self.data.factors_without_blocks(past)
     }
 
@@ -86,17 +86,17 @@ impl<'a> Source<'a> {
     }
 
     /// Number of experiments.
-    pub fn experiments(&self) -> usize {
+    pub(crate) fn experiments(&self) -> usize {
         self.records.experiments()
     }
 
     /// Divisor of each channel in the factors, inputs then outputs.
-    pub fn scale(&self) -> &[f64] {
+    pub(crate) fn scale(&self) -> &[f64] {
         &self.data.scale
     }
 
     /// Sample time in seconds.
-    pub fn sample_time(&self) -> f64 {
+    pub(crate) fn sample_time(&self) -> f64 {
         self.records.sample_time()
     }
 
@@ -105,7 +105,7 @@ impl<'a> Source<'a> {
     ///
     /// # Errors
     /// When reading fails, or when only moments are left.
-    pub fn signals(&mut self, experiment: usize) -> Result<Vec<Vec<f64>>, IdentifyError> {
+    pub(crate) fn signals(&mut self, experiment: usize) -> Result<Vec<Vec<f64>>, IdentifyError> {
         if self.records.reduced().is_some() {
             return Err(IdentifyError::MomentsOnly {
                 reason: "this method looks at every sample",

@@ -31,14 +31,14 @@ const DERIVATIVES: usize = 4;
 /// Sizes of a request, as far as they are known.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sizes {
-    pub inputs: usize,
-    pub outputs: usize,
+    pub(crate) inputs: usize,
+    pub(crate) outputs: usize,
     /// Past window, where it is known; nothing of the size of a window is counted before.
-    pub past: Option<usize>,
+    pub(crate) past: Option<usize>,
     /// Lags of the moments.
-    pub lags: usize,
+    pub(crate) lags: usize,
     /// Order, where it is known.
-    pub order: Option<usize>,
+    pub(crate) order: Option<usize>,
 }
 
 impl Sizes {

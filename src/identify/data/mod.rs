@@ -17,11 +17,13 @@ mod recording_moments;
 mod records;
 mod reduced_records;
 
-pub use delay::{AlignedColumns, Aligner};
-pub use factor_source::Source;
+pub(crate) use delay::AlignedColumns;
+pub(crate) use factor_source::Source;
 pub(crate) use factor_source::deviations;
 pub(crate) use lags::{lags_needed, longest_past};
 pub(crate) use memory_need::Sizes;
 pub(crate) use recording_moments::Data;
-pub use records::{FileRecords, MemoryRecords, ReadProgress, Recording, Records, on_files};
+#[cfg(feature = "cli")]
+pub(crate) use records::on_files;
+pub use records::{FileRecords, MemoryRecords, ReadProgress, Recording, Records};
 pub use reduced_records::{ReducedRecords, SAMPLES_KEPT};

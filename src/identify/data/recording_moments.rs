@@ -24,11 +24,11 @@ pub(crate) struct Data {
     delays: Vec<usize>,
     inputs: usize,
     /// Divisor of each channel.
-    pub scale: Vec<f64>,
+    pub(crate) scale: Vec<f64>,
     /// Level of each channel, averaged over the experiments.
-    pub levels: Vec<f64>,
+    pub(crate) levels: Vec<f64>,
     /// Samples of all experiments.
-    pub samples: usize,
+    pub(crate) samples: usize,
 }
 
 impl Data {

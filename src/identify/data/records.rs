@@ -1,6 +1,7 @@
 //! Where the samples come from: memory, or files that are streamed.
 
 use super::reduced_records::ReducedRecords;
+#[cfg(feature = "cli")]
 use crate::identify::IdentifyError;
 use crate::log::{
     Block, Channel, Log, LogError, LogReader, LogSummary, Reading, RoleNeed, Roles, Source,
@@ -108,18 +109,20 @@ impl<'a> MemoryRecords<'a> {
         Ok(Self { logs, recordings })
     }
 
+    #[cfg(feature = "cli")]
     /// With what is known of the recordings beside their samples, one a log.
     fn with_recordings(self, recordings: Vec<Recording>) -> Self {
         Self { recordings, ..self }
     }
 }
 
+#[cfg(feature = "cli")]
 /// Runs `work` on recordings that are streamed from files; where a file is not plain, again on what [`Reading`] makes of
 /// them in memory. With the result come the recordings that were not plain, as they were read.
 ///
 /// # Errors
 /// What is wrong with a file, or what `work` says.
-pub fn on_files<T>(
+pub(crate) fn on_files<T>(
     sources: &[Source],
     roles: &Roles,
     progress: Option<ReadProgress<'_>>,

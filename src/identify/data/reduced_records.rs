@@ -26,7 +26,7 @@ pub const SAMPLES_KEPT: usize = 20_000;
 /// use innovant::identify::{Options, ReducedRecords, SAMPLES_KEPT, identify, identify_records};
 ///
 /// let options = Options::default();
-/// let log = innovant::systems::van_wingerden_one().record(4000, 1);
+/// let log = innovant::internal::systems::van_wingerden_one().record(4000, 1);
 /// let (first, second) = log.split_at(1500)?;
 /// let mut reduced = ReducedRecords::new(&first, 0, &options, SAMPLES_KEPT)?
 ///     .append(&ReducedRecords::new(&second, 0, &options, 0)?)?;

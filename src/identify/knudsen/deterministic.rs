@@ -8,17 +8,17 @@ use crate::identify::IdentifyError;
 
 /// The deterministic part of a model.
 #[derive(Debug, Clone)]
-pub struct Deterministic {
+pub(crate) struct Deterministic {
     /// State matrix, `n x n`.
-    pub a: DMatrix<f64>,
+    pub(crate) a: DMatrix<f64>,
     /// Input matrix, `n x m`.
-    pub b: DMatrix<f64>,
+    pub(crate) b: DMatrix<f64>,
     /// Output matrix, `l x n`.
-    pub c: DMatrix<f64>,
+    pub(crate) c: DMatrix<f64>,
     /// Feedthrough, `l x m`.
-    pub d: DMatrix<f64>,
+    pub(crate) d: DMatrix<f64>,
     /// What it was computed from.
-    pub observability: Observability,
+    pub(crate) observability: Observability,
 }
 
 /// Knudsen (13)-(15) and (22)-(24). In print (23) has lost its roles: `A` is the pseudo-inverse of the *upper*
@@ -27,7 +27,7 @@ pub struct Deterministic {
 /// # Errors
 /// [`IdentifyError::Order`] for an order that the horizon does not allow, [`IdentifyError::SingularRegression`] when
 /// the data do not determine the matrices.
-pub fn deterministic(
+pub(crate) fn deterministic(
     regression: &Regression,
     decomposition: &Decomposition,
     order: usize,
@@ -51,7 +51,7 @@ pub fn deterministic(
 ///
 /// # Errors
 /// [`IdentifyError::SingularRegression`] when the horizon is too short for them.
-pub fn inputs(
+pub(crate) fn inputs(
     regression: &Regression,
     observability: &Observability,
     a: &DMatrix<f64>,

@@ -15,23 +15,23 @@ const DEPENDENT: f64 = 1e-12;
 /// `W_p` holds the past samples in the order of the recording, `[u; y]` of the oldest first. The paper stacks all
 /// outputs before all inputs; nothing that follows depends on the order.
 #[derive(Debug, Clone)]
-pub struct Regression {
+pub(crate) struct Regression {
     /// Past window `i`.
-    pub past: usize,
+    pub(crate) past: usize,
     /// Future window `h`.
-    pub future: usize,
+    pub(crate) future: usize,
     /// Number of inputs `m`.
-    pub inputs: usize,
+    pub(crate) inputs: usize,
     /// Number of outputs `l`.
-    pub outputs: usize,
+    pub(crate) outputs: usize,
     /// Number of windows `j`.
-    pub columns: usize,
+    pub(crate) columns: usize,
     /// Triangular factor of `[Z; y_i; .. ; y_{i+h-1}]` (as columns): what is below the rows of `Z` is residual.
-    pub factor: DMatrix<f64>,
+    pub(crate) factor: DMatrix<f64>,
     /// `Theta = [Theta_p Theta_f]`, `h l x (i (m + l) + h m)`.
-    pub coefficients: DMatrix<f64>,
+    pub(crate) coefficients: DMatrix<f64>,
     /// `P`, the covariance of the residuals, `h l` square, divided by `j` less the rows of `Z`.
-    pub residual_covariance: DMatrix<f64>,
+    pub(crate) residual_covariance: DMatrix<f64>,
 }
 
 impl Regression {
@@ -41,7 +41,7 @@ impl Regression {
     /// # Errors
     /// [`IdentifyError::TooShort`] when there are not more windows than variables, [`IdentifyError::Horizon`] when
     /// the factor holds no future.
-    pub fn new(factor: &RFactor, past: usize) -> Result<Self, IdentifyError> {
+    pub(crate) fn new(factor: &RFactor, past: usize) -> Result<Self, IdentifyError> {
         let (q, inputs, outputs) = (factor.channels(), factor.inputs, factor.outputs);
         let blocks = factor.past + 1;
         if past == 0 || past >= blocks {
@@ -103,27 +103,27 @@ impl Regression {
     }
 
     /// Rows of `Z`.
-    pub fn regressors(&self) -> usize {
+    pub(crate) fn regressors(&self) -> usize {
         self.coefficients.ncols()
     }
 
     /// Rows of `W_p`.
-    pub fn past_rows(&self) -> usize {
+    pub(crate) fn past_rows(&self) -> usize {
         self.past * (self.inputs + self.outputs)
     }
 
     /// Residual degrees of freedom, `j` less the rows of `Z`.
-    pub fn degrees_of_freedom(&self) -> usize {
+    pub(crate) fn degrees_of_freedom(&self) -> usize {
         self.columns - self.regressors()
     }
 
     /// `Theta_p`, `h l x i (m + l)`.
-    pub fn past_coefficients(&self) -> DMatrix<f64> {
+    pub(crate) fn past_coefficients(&self) -> DMatrix<f64> {
         self.coefficients.columns(0, self.past_rows()).into_owned()
     }
 
     /// `Theta_f`, the estimate of the Toeplitz matrix `H_h^d` (17), `h l x h m`.
-    pub fn future_coefficients(&self) -> DMatrix<f64> {
+    pub(crate) fn future_coefficients(&self) -> DMatrix<f64> {
         let first = self.past_rows();
         self.coefficients
             .columns(first, self.future * self.inputs)
@@ -131,13 +131,13 @@ impl Regression {
     }
 
     /// Triangular root of `W_p W_p'` (as `R' R`), `i (m + l)` square.
-    pub fn past_factor(&self) -> DMatrix<f64> {
+    pub(crate) fn past_factor(&self) -> DMatrix<f64> {
         let rows = self.past_rows();
         self.factor.view((0, 0), (rows, rows)).into_owned()
     }
 
     /// Triangular root of `Z Z'` (as `R' R`).
-    pub fn regressor_factor(&self) -> DMatrix<f64> {
+    pub(crate) fn regressor_factor(&self) -> DMatrix<f64> {
         let rows = self.regressors();
         self.factor.view((0, 0), (rows, rows)).into_owned()
     }

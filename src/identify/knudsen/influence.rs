@@ -21,20 +21,9 @@ use crate::linalg::{
 /// Windows that are taken at a time.
 const BATCH: usize = 1024;
 
-/// Covariance of the parameters together with that of the innovation covariance.
-#[derive(Debug, Clone)]
-pub struct DeltaCovariance {
-    /// Of the system matrices.
-    pub parameters: ParameterCovariance,
-    /// Of `[theta; vech R]`.
-    pub joint: DMatrix<f64>,
-    /// Number of windows that it was computed from.
-    pub windows: usize,
-}
-
 /// Collects the influence of every window.
 #[derive(Debug)]
-pub struct Influence<'a> {
+pub(crate) struct Influence<'a> {
     regression: &'a Regression,
     /// `J_Theta` as `(parameter, a) x b`.
     of_coefficients: DMatrix<f64>,
@@ -48,7 +37,7 @@ pub struct Influence<'a> {
 
 impl<'a> Influence<'a> {
     /// For an estimate with this Jacobian.
-    pub fn new(regression: &'a Regression, jacobian: &Jacobian) -> Self {
+    pub(crate) fn new(regression: &'a Regression, jacobian: &Jacobian) -> Self {
         let parameters = jacobian.rows();
         let rows = regression.future * regression.outputs;
         let regressors = regression.regressors();
@@ -71,7 +60,7 @@ impl<'a> Influence<'a> {
     }
 
     /// Adds an experiment: one column of deviations a channel, inputs then outputs, in the units of the regression.
-    pub fn add(&mut self, channels: &[Vec<f64>]) {
+    pub(crate) fn add(&mut self, channels: &[Vec<f64>]) {
         let Regression {
             past,
             future,
@@ -143,11 +132,11 @@ impl<'a> Influence<'a> {
         out
     }
 
-    /// The covariance, negative eigenvalues set to zero.
+    /// The covariance of the system matrices, negative eigenvalues set to zero.
     ///
     /// # Errors
     /// [`LinalgError`] when its eigenvalues cannot be computed.
-    pub fn finish(self) -> Result<DeltaCovariance, LinalgError> {
+    pub(crate) fn finish(self) -> Result<ParameterCovariance, LinalgError> {
         let divisor = self.regression.columns as f64 * self.regression.degrees_of_freedom() as f64;
         // With a part of the windows the sum is scaled up to all of them.
         let scale = self.regression.columns as f64 / self.windows.max(1) as f64 / divisor;
@@ -179,14 +168,10 @@ impl<'a> Influence<'a> {
         }
         let joint = multiply_nt(&eigen.vectors, &eigen.vectors);
         let length = self.layout.len();
-        Ok(DeltaCovariance {
-            parameters: ParameterCovariance {
-                layout: self.layout,
-                matrix: joint.view((0, 0), (length, length)).into_owned(),
-                degrees_of_freedom: None,
-            },
-            joint,
-            windows: self.windows,
+        Ok(ParameterCovariance {
+            layout: self.layout,
+            matrix: joint.view((0, 0), (length, length)).into_owned(),
+            degrees_of_freedom: None,
         })
     }
 }

@@ -21,19 +21,19 @@ use crate::linalg::{cholesky_upper, multiply, multiply_tn, solve_upper, solve_up
 /// Jacobian of `[theta; vech R]`, `theta` laid out by `layout`, `vech R` the lower triangle of the innovation
 /// covariance column by column.
 #[derive(Debug, Clone)]
-pub struct Jacobian {
+pub(crate) struct Jacobian {
     /// Order of the parameters.
-    pub layout: ParameterLayout,
+    pub(crate) layout: ParameterLayout,
     /// With respect to `Theta[a, b]`, one column for each at `a + h l b`.
-    pub of_coefficients: DMatrix<f64>,
+    pub(crate) of_coefficients: DMatrix<f64>,
     /// With respect to a symmetric change of `P`: the derivative is `trace(S dP)` with the symmetric `S` of row `p`
     /// stored as a column vector, entry `(a, b)` at `a + h l b`.
-    pub of_covariance: DMatrix<f64>,
+    pub(crate) of_covariance: DMatrix<f64>,
 }
 
 impl Jacobian {
     /// Number of parameters with those of the innovation covariance.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.of_coefficients.nrows()
     }
 }
@@ -69,7 +69,7 @@ struct Change {
 ///
 /// # Errors
 /// As the estimate itself.
-pub fn jacobian(
+pub(crate) fn jacobian(
     regression: &Regression,
     decomposition: &Decomposition,
     deterministic: &Deterministic,

@@ -33,26 +33,24 @@ mod tests;
 use super::identify_error::IdentifyError;
 use crate::model::StateSpace;
 
-pub use deterministic::{Deterministic, deterministic, inputs};
-pub use future_regression::Regression;
-pub use influence::{DeltaCovariance, Influence};
-pub use jacobian::{Jacobian, jacobian};
-pub use observability::{Decomposition, Observability, extended_observability};
-pub use stochastic::{NoiseModel, ResidualStep, minimum_phase, stochastic};
+pub(crate) use deterministic::{Deterministic, deterministic, inputs};
+pub(crate) use future_regression::Regression;
+pub(crate) use influence::Influence;
+pub(crate) use jacobian::jacobian;
+pub(crate) use observability::{Decomposition, Observability, extended_observability};
+pub(crate) use stochastic::{NoiseModel, ResidualStep, minimum_phase, stochastic};
 
 /// A model of one order with what its covariance needs.
 #[derive(Debug, Clone)]
-pub struct Knudsen {
+pub(crate) struct Knudsen {
     /// Innovation form with a stable predictor, in the units of the regression.
-    pub system: StateSpace,
+    pub(crate) system: StateSpace,
     /// Covariance of the innovations.
-    pub innovation_covariance: nalgebra::DMatrix<f64>,
+    pub(crate) innovation_covariance: nalgebra::DMatrix<f64>,
     /// The deterministic part.
-    pub deterministic: Deterministic,
+    pub(crate) deterministic: Deterministic,
     /// The noise model before it was made minimum phase.
-    pub raw_noise: NoiseModel,
-    /// Whether it had to be.
-    pub mirrored: bool,
+    pub(crate) raw_noise: NoiseModel,
 }
 
 /// Knudsen's estimate of one order.
@@ -60,7 +58,7 @@ pub struct Knudsen {
 /// # Errors
 /// [`IdentifyError::Order`] for an order that the future window does not allow, [`IdentifyError::SingularRegression`]
 /// when the data do not determine the model.
-pub fn knudsen(
+pub(crate) fn knudsen(
     regression: &Regression,
     decomposition: &Decomposition,
     order: usize,
@@ -71,7 +69,7 @@ pub fn knudsen(
     let deterministic = deterministic(regression, decomposition, order, feedthrough)?;
     let (a, c) = (&deterministic.a, &deterministic.c);
     let raw_noise = stochastic(regression, &deterministic.observability, a, c, step)?;
-    let (noise, mirrored) = minimum_phase(a, c, raw_noise.clone());
+    let (noise, _) = minimum_phase(a, c, raw_noise.clone());
     Ok(Knudsen {
         system: StateSpace {
             a: a.clone(),
@@ -84,6 +82,5 @@ pub fn knudsen(
         innovation_covariance: noise.innovation_covariance,
         deterministic,
         raw_noise,
-        mirrored,
     })
 }

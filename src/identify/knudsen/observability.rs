@@ -15,26 +15,26 @@ const DEPENDENT: f64 = 1e-12;
 
 /// `Gamma_h` and `Gamma_h` perpendicular.
 #[derive(Debug, Clone)]
-pub struct Observability {
+pub(crate) struct Observability {
     /// `Gamma_h`, `h l x n`.
-    pub gamma: DMatrix<f64>,
+    pub(crate) gamma: DMatrix<f64>,
     /// Orthonormal complement of its columns, `h l x (h l - n)`.
-    pub complement: DMatrix<f64>,
+    pub(crate) complement: DMatrix<f64>,
     /// Number of outputs `l`.
-    pub outputs: usize,
+    pub(crate) outputs: usize,
 }
 
 /// The singular value decomposition (13) with the weight (14).
 #[derive(Debug, Clone)]
-pub struct Decomposition {
+pub(crate) struct Decomposition {
     /// All `h l` left singular vectors.
-    pub left: DMatrix<f64>,
+    pub(crate) left: DMatrix<f64>,
     /// Singular values, `h l` (zero where there are fewer columns).
-    pub values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// Right singular vectors in the coordinates of `W_p` times the weight, `i (m + l) x h l`.
-    pub right: DMatrix<f64>,
+    pub(crate) right: DMatrix<f64>,
     /// Number of outputs `l`.
-    pub outputs: usize,
+    pub(crate) outputs: usize,
 }
 
 impl Decomposition {
@@ -42,7 +42,7 @@ impl Decomposition {
     ///
     /// # Errors
     /// [`LinalgError`] when the decomposition does not converge.
-    pub fn new(regression: &Regression) -> Result<Self, LinalgError> {
+    pub(crate) fn new(regression: &Regression) -> Result<Self, LinalgError> {
         let product = multiply(
             &regression.past_coefficients(),
             &regression.past_factor().transpose(),
@@ -70,7 +70,7 @@ impl Decomposition {
     ///
     /// # Errors
     /// [`IdentifyError::Order`] when the horizon does not allow the order.
-    pub fn observability(&self, order: usize) -> Result<Observability, IdentifyError> {
+    pub(crate) fn observability(&self, order: usize) -> Result<Observability, IdentifyError> {
         let rows = self.left.nrows();
         check_order(order, rows / self.outputs, self.outputs)?;
         Ok(Observability {
@@ -97,7 +97,11 @@ fn check_order(order: usize, future: usize, outputs: usize) -> Result<(), Identi
 }
 
 /// `[C; C A; ...; C A^(blocks-1)]`.
-pub fn extended_observability(a: &DMatrix<f64>, c: &DMatrix<f64>, blocks: usize) -> DMatrix<f64> {
+pub(crate) fn extended_observability(
+    a: &DMatrix<f64>,
+    c: &DMatrix<f64>,
+    blocks: usize,
+) -> DMatrix<f64> {
     let (outputs, n) = c.shape();
     let mut out = DMatrix::zeros(blocks * outputs, n);
     let mut row = c.clone();
@@ -114,7 +118,11 @@ impl Observability {
     /// # Errors
     /// [`IdentifyError::Order`] when the horizon does not allow the order, [`IdentifyError::SingularRegression`] when
     /// the pair is not observable.
-    pub fn of(a: &DMatrix<f64>, c: &DMatrix<f64>, future: usize) -> Result<Self, IdentifyError> {
+    pub(crate) fn of(
+        a: &DMatrix<f64>,
+        c: &DMatrix<f64>,
+        future: usize,
+    ) -> Result<Self, IdentifyError> {
         let (outputs, n) = c.shape();
         check_order(n, future, outputs)?;
         let gamma = extended_observability(a, c, future);
@@ -133,25 +141,20 @@ impl Observability {
         })
     }
 
-    /// Number of states.
-    pub fn states(&self) -> usize {
-        self.gamma.ncols()
-    }
-
     /// Future window `h`.
-    pub fn future(&self) -> usize {
+    pub(crate) fn future(&self) -> usize {
         self.gamma.nrows() / self.outputs
     }
 
     /// All block rows but the last.
-    pub fn upper(&self) -> DMatrix<f64> {
+    pub(crate) fn upper(&self) -> DMatrix<f64> {
         self.gamma
             .rows(0, self.gamma.nrows() - self.outputs)
             .into_owned()
     }
 
     /// All block rows but the first.
-    pub fn lower(&self) -> DMatrix<f64> {
+    pub(crate) fn lower(&self) -> DMatrix<f64> {
         let rows = self.gamma.nrows() - self.outputs;
         self.gamma.rows(self.outputs, rows).into_owned()
     }
@@ -159,7 +162,7 @@ impl Observability {
     /// `F` of the least-squares problems (24) and (38): with `H` the Toeplitz matrix of `(A, B, C, D)`, its block
     /// column `k` is `S_k [D; B]`, `S_k = [0; [I 0]; [0 Gamma_{h-1-k}(A, C)]]`, so that
     /// `F [D; B] = stack_k(Gamma_perp' H[:, k])`, `F = stack_k(Gamma_perp' S_k)`, `h (h l - n) x (l + n)`.
-    pub fn toeplitz_regressor(&self, a: &DMatrix<f64>, c: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(crate) fn toeplitz_regressor(&self, a: &DMatrix<f64>, c: &DMatrix<f64>) -> DMatrix<f64> {
         toeplitz_regressor(
             &self.complement,
             &extended_observability(a, c, self.future()),
@@ -168,7 +171,7 @@ impl Observability {
     }
 
     /// `stack_k(Gamma_perp' H[:, k])` for a matrix of `h` block columns of `width`: `h (h l - n) x width`.
-    pub fn stacked(&self, toeplitz: &DMatrix<f64>, width: usize) -> DMatrix<f64> {
+    pub(crate) fn stacked(&self, toeplitz: &DMatrix<f64>, width: usize) -> DMatrix<f64> {
         stacked(&self.complement, toeplitz, width)
     }
 }

@@ -20,7 +20,7 @@ const NOISE_FREE: f64 = 1e-16;
     Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
 )]
 #[serde(rename_all = "kebab-case")]
-pub enum ResidualStep {
+pub(crate) enum ResidualStep {
     /// Its first block column, (35)-(36): the paper's tk.
     FirstColumn,
     /// Its Cholesky factor, a Toeplitz matrix but for the bias, most of which `Gamma_perp` removes, (37)-(40): the
@@ -31,11 +31,11 @@ pub enum ResidualStep {
 
 /// The stochastic part of a model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct NoiseModel {
+pub(crate) struct NoiseModel {
     /// Observer gain, `n x l`.
-    pub k: DMatrix<f64>,
+    pub(crate) k: DMatrix<f64>,
     /// Covariance of the innovations, `l x l`.
-    pub innovation_covariance: DMatrix<f64>,
+    pub(crate) innovation_covariance: DMatrix<f64>,
 }
 
 /// `K` and `R` for given `A`, `C` from the residual covariance `P` of the regression.
@@ -45,7 +45,7 @@ pub struct NoiseModel {
 /// # Errors
 /// [`IdentifyError::SingularRegression`] when the horizon is too short, [`IdentifyError::Linalg`] when `P` or the
 /// estimate of `G` is singular.
-pub fn stochastic(
+pub(crate) fn stochastic(
     regression: &Regression,
     observability: &Observability,
     a: &DMatrix<f64>,
@@ -143,7 +143,11 @@ pub(super) fn right_quotient(
 ///
 /// For one output it mirrors the zeros outside the unit circle and multiplies the variance by the squared modulus of
 /// each. A zero on the circle to rounding leaves the model as it is.
-pub fn minimum_phase(a: &DMatrix<f64>, c: &DMatrix<f64>, noise: NoiseModel) -> (NoiseModel, bool) {
+pub(crate) fn minimum_phase(
+    a: &DMatrix<f64>,
+    c: &DMatrix<f64>,
+    noise: NoiseModel,
+) -> (NoiseModel, bool) {
     let predictor = a - &noise.k * c;
     let stable = spectral_radius(&predictor).is_ok_and(|radius| radius < 1.0);
     if stable {

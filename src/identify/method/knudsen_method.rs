@@ -190,7 +190,7 @@ impl Uncertain for OfOrder {
             let part: Vec<Vec<f64>> = signals.iter().map(|c| c[..take].to_vec()).collect();
             influence.add(&part);
         }
-        Ok(Some(influence.finish()?.parameters))
+        Ok(Some(influence.finish()?))
     }
 
     fn replicate(&self, factor: &RFactor) -> Result<StateSpace, IdentifyError> {

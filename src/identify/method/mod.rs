@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-pub use super::algorithms::Method;
+pub(crate) use super::algorithms::Method;
 use super::algorithms::Stochastic;
 use super::data::Source;
 use super::identify_error::IdentifyError;
@@ -38,7 +38,7 @@ impl Method {
     ///
     /// # Errors
     /// [`IdentifyError`] when the windows do not fit the data, or a factorisation fails.
-    pub fn decompose(
+    pub(crate) fn decompose(
         self,
         windows: &Windows,
         source: &mut Source<'_>,
@@ -60,38 +60,38 @@ impl Method {
 
 /// The data of one past window, and the future window and weight to be used.
 #[derive(Debug, Clone)]
-pub struct Windows {
+pub(crate) struct Windows {
     /// Data factor of the past window, over all windows of the recordings.
-    pub factor: Arc<RFactor>,
+    pub(crate) factor: Arc<RFactor>,
     /// Vector ARX estimate of the past window.
-    pub varx: Arc<Varx>,
+    pub(crate) varx: Arc<Varx>,
     /// Future window `f`.
-    pub future: usize,
+    pub(crate) future: usize,
     /// Weight of the singular value decomposition.
-    pub weight: Weight,
+    pub(crate) weight: Weight,
     /// The stochastic step that was asked for, for a method that does it itself ([`Method::has_own`]).
-    pub stochastic: Option<Stochastic>,
+    pub(crate) stochastic: Option<Stochastic>,
     /// Whether orders are still being compared: what only the final model needs can wait.
-    pub comparing: bool,
+    pub(crate) comparing: bool,
     /// Whether a method that polishes its estimate itself ([`Method::polishes_itself`]) is to do so.
-    pub polish_by_method: bool,
+    pub(crate) polish_by_method: bool,
     /// Sample time in seconds.
-    pub sample_time: f64,
+    pub(crate) sample_time: f64,
 }
 
 /// What all orders of one past and one future window share.
 #[derive(Debug, Clone)]
-pub struct Decomposed {
+pub(crate) struct Decomposed {
     /// Singular values of the weighted product, decreasing.
-    pub singular_values: Vec<f64>,
+    pub(crate) singular_values: Vec<f64>,
     /// Largest order that the decomposition can give.
-    pub largest_order: usize,
+    pub(crate) largest_order: usize,
     orders: Arc<dyn Orders>,
 }
 
 impl Decomposed {
     /// What the decomposition shows, and how one order is estimated from it.
-    pub fn new(
+    pub(crate) fn new(
         singular_values: Vec<f64>,
         largest_order: usize,
         orders: impl Orders + 'static,
@@ -107,7 +107,7 @@ impl Decomposed {
     ///
     /// # Errors
     /// [`IdentifyError::SingularRegression`] for an order that the data do not support.
-    pub fn estimate(
+    pub(crate) fn estimate(
         &self,
         order: usize,
         source: &mut Source<'_>,
@@ -117,7 +117,7 @@ impl Decomposed {
 }
 
 /// How a method estimates one order.
-pub trait Orders: Debug + Send + Sync {
+pub(crate) trait Orders: Debug + Send + Sync {
     /// See [`Decomposed::estimate`].
     ///
     /// # Errors
@@ -127,21 +127,21 @@ pub trait Orders: Debug + Send + Sync {
 
 /// A model of one order, in scaled units (every channel divided by [`RFactor::scale`]).
 #[derive(Debug, Clone)]
-pub struct Estimated {
+pub(crate) struct Estimated {
     /// System matrices.
-    pub system: StateSpace,
+    pub(crate) system: StateSpace,
     /// Covariance of the innovations.
-    pub innovation_covariance: DMatrix<f64>,
+    pub(crate) innovation_covariance: DMatrix<f64>,
     /// Past window of the data factor that [`Uncertain::replicate`] takes.
-    pub window: usize,
+    pub(crate) window: usize,
     /// Whether the estimate is what the method aims at; a search may run out of steps.
-    pub converged: bool,
+    pub(crate) converged: bool,
     /// Where its covariance comes from.
-    pub uncertain: Arc<dyn Uncertain>,
+    pub(crate) uncertain: Arc<dyn Uncertain>,
 }
 
 /// Where the covariance of an estimate comes from. Nothing is computed before it is asked for.
-pub trait Uncertain: Debug + Send + Sync {
+pub(crate) trait Uncertain: Debug + Send + Sync {
     /// How the errors of the parameters follow from unit white noise, to first order, together with the errors of
     /// the vector ARX coefficients; `None` when that is not known. It gives covariances to models whose
     /// stochastic part comes from another step.

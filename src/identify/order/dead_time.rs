@@ -65,11 +65,11 @@ fn leading_zeros(varx: &Varx, upper: &DMatrix<f64>, input: usize) -> Option<usiz
 #[derive(Debug, Clone)]
 pub(crate) struct Evidence {
     /// Leading lags of each input that do nothing.
-    pub proposed: Vec<usize>,
+    pub(crate) proposed: Vec<usize>,
     /// Schwarz's criterion of the model against its vector ARX model, where it was computed.
     schwarz: Option<f64>,
     /// Whether the chi-square test accepts the order.
-    pub accepted: bool,
+    pub(crate) accepted: bool,
     /// `log det` of the innovation covariance of the vector ARX model in the user's units, by maximum likelihood.
     log_determinant: f64,
     /// Windows of the vector ARX model.

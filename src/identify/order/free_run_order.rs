@@ -63,13 +63,13 @@ pub struct FreeRunRest {
 /// What the free runs lead to.
 pub(crate) struct FreeRun {
     /// Data of the window.
-    pub windowed: Windowed,
+    pub(crate) windowed: Windowed,
     /// The order, with the sentence why.
-    pub selection: Selection,
+    pub(crate) selection: Selection,
     /// Whether the model had to be made stable to be run.
-    pub unstable: bool,
+    pub(crate) unstable: bool,
     /// What the model does not hold.
-    pub rest: Vec<FreeRunRest>,
+    pub(crate) rest: Vec<FreeRunRest>,
 }
 
 /// Whether the singular values ask for so many states that the plant is hardly linear.

@@ -19,29 +19,29 @@ const GAIN_OVER_TRUNCATION: f64 = 10.0;
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
     /// Order.
-    pub order: usize,
+    pub(crate) order: usize,
     /// The estimate of the method.
-    pub estimate: Estimated,
+    pub(crate) estimate: Estimated,
     /// Maximum likelihood, when it was tried. An iteration that did not converge has still gone downhill: its
     /// cost is an upper bound of the smallest.
-    pub polished: Option<Polished>,
+    pub(crate) polished: Option<Polished>,
     /// The best estimate there is, with a stable predictor.
-    pub predictor: StateSpace,
+    pub(crate) predictor: StateSpace,
     /// Covariance of its state.
-    pub state_covariance: DMatrix<f64>,
+    pub(crate) state_covariance: DMatrix<f64>,
     /// Its truncation measure for the past window.
-    pub truncation: f64,
+    pub(crate) truncation: f64,
 }
 
 /// Everything that candidates of one past window share.
 #[derive(Debug, Clone)]
 pub(super) struct Window {
     /// Data, with the weight; the future window depends on the order.
-    pub windows: Windows,
+    pub(super) windows: Windows,
     /// Whether candidates are polished.
-    pub polish: bool,
+    pub(super) polish: bool,
     /// And how far.
-    pub effort: Effort,
+    pub(super) effort: Effort,
 }
 
 impl Window {

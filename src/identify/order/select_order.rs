@@ -22,9 +22,9 @@ const NOISE_FREE: f64 = 1e-16;
 /// The data factor of a past window with its vector ARX model.
 pub(crate) struct Windowed {
     /// Data.
-    pub factor: Arc<RFactor>,
+    pub(crate) factor: Arc<RFactor>,
     /// Vector ARX estimate.
-    pub varx: Arc<Varx>,
+    pub(crate) varx: Arc<Varx>,
 }
 
 /// The data of a past window, if they fit into memory.
@@ -50,19 +50,19 @@ pub(crate) fn windowed(
 /// The chosen order with everything that spoke for it.
 pub(crate) struct Selection {
     /// The model of that order.
-    pub candidate: Candidate,
+    pub(crate) candidate: Candidate,
     /// Singular values of the decomposition that it came from.
-    pub singular_values: Vec<f64>,
+    pub(crate) singular_values: Vec<f64>,
     /// Weight of that decomposition.
-    pub weight: Weight,
+    pub(crate) weight: Weight,
     /// Future window.
-    pub future: usize,
+    pub(crate) future: usize,
     /// What spoke for and against each order.
-    pub evidence: Vec<OrderEvidence>,
+    pub(crate) evidence: Vec<OrderEvidence>,
     /// Why this order.
-    pub explanation: String,
+    pub(crate) explanation: String,
     /// Whether the record is noise-free to rounding.
-    pub noise_free: bool,
+    pub(crate) noise_free: bool,
 }
 
 impl Selection {

@@ -26,13 +26,13 @@ use crate::linalg::{
     LinalgError, all_finite, cholesky_upper, multiply_nt, multiply_tn, qr_r,
     solve_upper_transposed, svd_thin,
 };
-use crate::model::{Armax, ModelError, StateSpace};
+use crate::model::{ModelError, StateSpace};
 
-pub use parametrisation::Form;
-pub use sensitivity::Signals;
+pub(crate) use parametrisation::Form;
+pub(crate) use sensitivity::Signals;
 
 /// A search that has not ended by then will not.
-pub const STEPS: usize = 100;
+pub(crate) const STEPS: usize = 100;
 /// The search ends when a step promises less than this in the cost, in units of chi-square: the parameters are then
 /// within a thousandth of a standard deviation of the minimum.
 const DECREASE: f64 = 1e-6;
@@ -55,25 +55,20 @@ const UNDETERMINED: f64 = 1e-11;
 
 /// Result of the search.
 #[derive(Debug, Clone)]
-pub struct PredictionErrorEstimate {
+pub(crate) struct PredictionErrorEstimate {
     /// The model, in the units of the signals.
-    pub system: StateSpace,
+    pub(crate) system: StateSpace,
     /// Covariance of the innovations: sum of squares over residual degrees of freedom.
-    pub innovation_covariance: DMatrix<f64>,
+    pub(crate) innovation_covariance: DMatrix<f64>,
     /// Inverse information, in the basis of the system.
-    pub covariance: ParameterCovariance,
+    pub(crate) covariance: ParameterCovariance,
+    #[cfg(feature = "cli")]
     /// The polynomials with the covariance of `a1..an, (b0), b1..bn, c1..cn`, when that was the form.
-    pub armax: Option<(Armax, DMatrix<f64>)>,
-    /// Initial state of each experiment.
-    pub initial_states: Vec<DVector<f64>>,
-    /// `N log det` of the mean square prediction errors, at the start and at the end.
-    pub start_cost: f64,
-    /// The same at the end.
-    pub cost: f64,
-    /// Gauss-Newton steps.
-    pub steps: usize,
+    pub(crate) armax: Option<(crate::model::Armax, DMatrix<f64>)>,
+    /// `N log det` of the mean square prediction errors.
+    pub(crate) cost: f64,
     /// Whether no step promised anything any more.
-    pub converged: bool,
+    pub(crate) converged: bool,
 }
 
 /// Improves `start` by at most `steps` steps.
@@ -82,7 +77,7 @@ pub struct PredictionErrorEstimate {
 /// [`IdentifyError::Option`] for an ARMAX form of a model that has not one input and one output,
 /// [`IdentifyError::Linalg`] when the prediction errors of the start are not finite or vanish (a noise-free recording
 /// has no likelihood).
-pub fn prediction_error_method(
+pub(crate) fn prediction_error_method(
     start: &StateSpace,
     experiments: &[&Signals],
     feedthrough: bool,
@@ -108,7 +103,6 @@ pub fn prediction_error_method(
     // The initial state depends on the weight and the weight on it: twice is enough.
     let rough = search.point(start.clone(), &identity)?;
     let mut point = search.point(start, &rough.mean_square)?;
-    let start_cost = point.cost;
     let mut taken = 0;
     let mut converged = false;
     let (directions, linearised) = loop {
@@ -153,6 +147,7 @@ pub fn prediction_error_method(
     let coordinates = linearised.covariance() * inflation;
     let matrix = multiply_nt(&(&directions * &coordinates), &directions);
     Ok(PredictionErrorEstimate {
+        #[cfg(feature = "cli")]
         armax: (form == Form::Armax).then(|| {
             (
                 parametrisation::armax_of_observer_form(&point.system),
@@ -161,11 +156,8 @@ pub fn prediction_error_method(
         }),
         covariance: ParameterCovariance::of_matrix(layout, &matrix),
         innovation_covariance: &point.mean_square * inflation,
-        initial_states: point.initial_states,
         system: point.system,
-        start_cost,
         cost: point.cost,
-        steps: taken,
         converged,
     })
 }

@@ -9,7 +9,7 @@ use crate::model::{Armax, StateSpace};
 
 /// Form of the model that is searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Form {
+pub(crate) enum Form {
     /// Innovation form with all entries free but those that only change the state basis: data-driven local
     /// coordinates (McKelvey, Helmersson & Ribarits 2004). Any number of inputs and outputs.
     Innovation,
@@ -108,6 +108,7 @@ fn polynomials(system: &StateSpace) -> Polynomials {
     out
 }
 
+#[cfg(feature = "cli")]
 /// The polynomials of a system that is in observer form.
 pub(super) fn armax_of_observer_form(system: &StateSpace) -> Armax {
     let Polynomials { a, b, c } = polynomials(system);

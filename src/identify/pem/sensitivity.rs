@@ -12,7 +12,7 @@ const BLOCK: usize = 4096;
 const UNDETERMINED: f64 = 1e-10;
 
 /// An experiment: one column of deviations a channel, inputs then outputs.
-pub type Signals = [Vec<f64>];
+pub(crate) type Signals = [Vec<f64>];
 
 /// Inputs and outputs as slices.
 fn split(signals: &Signals, inputs: usize) -> (Vec<&[f64]>, Vec<&[f64]>) {

@@ -61,7 +61,7 @@ const GAIN: f64 = 1e-5;
 
 /// How far to go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Effort {
+pub(crate) enum Effort {
     /// To the minimum.
     Full,
     /// To the minimum, unless it becomes plain that the chi-square test rejects the order anyway.
@@ -74,21 +74,21 @@ const HOPELESS: f64 = 10.0;
 
 /// Result of the polish, in scaled units.
 #[derive(Debug, Clone)]
-pub struct Polished {
+pub(crate) struct Polished {
     /// The system at the minimum.
-    pub system: StateSpace,
+    pub(crate) system: StateSpace,
     /// Inverse information, `(X' X)^+`, in the basis of the system.
-    pub covariance: ParameterCovariance,
+    pub(crate) covariance: ParameterCovariance,
     /// Cost at the start and at the minimum (chi-square units).
-    pub start_cost: f64,
+    pub(crate) start_cost: f64,
     /// Cost at the minimum.
-    pub cost: f64,
+    pub(crate) cost: f64,
     /// Degrees of freedom of the cost.
-    pub degrees_of_freedom: usize,
+    pub(crate) degrees_of_freedom: usize,
     /// Number of Gauss-Newton steps.
-    pub iterations: usize,
+    pub(crate) iterations: usize,
     /// Whether the iteration ended by its criterion.
-    pub converged: bool,
+    pub(crate) converged: bool,
 }
 
 /// Polishes `start` against the vector ARX estimate. When `largest_radius` is given, the spectral radius of
@@ -97,7 +97,7 @@ pub struct Polished {
 /// # Errors
 /// [`LinalgError`] when the innovation covariance is singular (a noise-free record needs no polish) or
 /// the iteration meets numbers that are not finite at its start.
-pub fn polish(
+pub(crate) fn polish(
     start: &StateSpace,
     varx: &Varx,
     largest_radius: Option<f64>,
@@ -238,7 +238,7 @@ fn tries() -> impl Iterator<Item = (f64, f64)> {
 ///
 /// # Errors
 /// [`LinalgError`] when the innovation covariance is singular.
-pub fn coefficient_cost(system: &StateSpace, varx: &Varx) -> Result<f64, LinalgError> {
+pub(crate) fn coefficient_cost(system: &StateSpace, varx: &Varx) -> Result<f64, LinalgError> {
     let upper = cholesky_upper(&varx.innovation_covariance)?;
     let coefficients = predictor_coefficients(system, varx.past, varx.feedthrough);
     let difference = &varx.output_factor - multiply_nt(&varx.regressor_factor, &coefficients);

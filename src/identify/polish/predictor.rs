@@ -245,11 +245,11 @@ fn predictor_derivative(
 }
 
 #[cfg(test)]
-pub mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::linalg::qr_r;
 
-    pub fn system(feedthrough: bool) -> StateSpace {
+    pub(crate) fn system(feedthrough: bool) -> StateSpace {
         StateSpace {
             a: DMatrix::from_row_slice(2, 2, &[0.7, 0.3, -0.3, 0.6]),
             b: DMatrix::from_row_slice(2, 3, &[1.0, 0.2, -0.7, -0.5, 0.9, 0.3]),
@@ -262,7 +262,7 @@ pub mod tests {
     }
 
     /// A vector ARX model whose coefficients are those of `truth`, in a metric that is not the identity.
-    pub fn varx_of(truth: &StateSpace, past: usize, feedthrough: bool) -> Varx {
+    pub(crate) fn varx_of(truth: &StateSpace, past: usize, feedthrough: bool) -> Varx {
         let coefficients = predictor_coefficients(truth, past, feedthrough);
         let m = coefficients.ncols();
         let data = DMatrix::from_fn(m + 40, m, |i, j| {

@@ -51,19 +51,19 @@ pub struct Fit {
 /// Everything decided before the final numbers.
 pub(crate) struct Chosen {
     /// Data of the past window.
-    pub windowed: Windowed,
+    pub(crate) windowed: Windowed,
     /// The order.
-    pub selection: Selection,
+    pub(crate) selection: Selection,
     /// Evidence on the past windows.
-    pub past_windows: Vec<PastEvidence>,
+    pub(crate) past_windows: Vec<PastEvidence>,
     /// Channels that were recorded in steps.
-    pub stepped: Vec<Stepped>,
+    pub(crate) stepped: Vec<Stepped>,
     /// Longest past window that the recording allowed, where it was the choice.
-    pub past_limited_to: Option<usize>,
+    pub(crate) past_limited_to: Option<usize>,
     /// What the free run on held-out blocks leaves, where that decided about the order.
-    pub free_run_rest: Vec<FreeRunRest>,
+    pub(crate) free_run_rest: Vec<FreeRunRest>,
     /// How it was decided.
-    pub explanation: Vec<String>,
+    pub(crate) explanation: Vec<String>,
 }
 
 /// Makes the model out of what was chosen.

@@ -13,9 +13,9 @@ mod scaling;
 mod summary;
 mod warnings;
 
-pub use final_estimate::Fit;
+pub(crate) use final_estimate::Fit;
 pub(crate) use final_estimate::{Chosen, finish};
 pub use resolution::CoarseChannel;
 pub(crate) use resolution::stepped;
 pub use summary::{Asked, Diagnostics, Horizons, OrderTest, PastEvidence, StabilityCost, Summary};
-pub use warnings::of_closed_loop;
+pub(crate) use warnings::of_closed_loop;

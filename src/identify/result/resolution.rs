@@ -42,11 +42,11 @@ const SAMPLES: usize = 4000;
 #[derive(Debug, Clone)]
 pub(crate) struct Stepped {
     /// Index of the channel, inputs first.
-    pub index: usize,
+    pub(crate) index: usize,
     /// Its name.
-    pub name: String,
+    pub(crate) name: String,
     /// The steps, in its unit.
-    pub step: f64,
+    pub(crate) step: f64,
 }
 
 /// The channels that were recorded in steps, by the first recording.

@@ -202,7 +202,7 @@ fn of_rounding(channels: &[CoarseChannel], condition: &str) -> Vec<String> {
 }
 
 /// Warnings that follow when the residual tests find that the recordings were taken in closed loop.
-pub fn of_closed_loop(summary: &Summary) -> Vec<String> {
+pub(crate) fn of_closed_loop(summary: &Summary) -> Vec<String> {
     let mut out = Vec::new();
     // The polish to maximum likelihood ends at the same model from any start; the few steps of a method that polishes
     // itself do not leave its bias behind.

@@ -15,7 +15,7 @@ mod residual;
 
 use nalgebra::DMatrix;
 
-pub use super::algorithms::Stochastic;
+pub(crate) use super::algorithms::Stochastic;
 use super::identify_error::IdentifyError;
 use super::knudsen::ResidualStep;
 use super::method::{Decomposed, Windows};
@@ -25,16 +25,16 @@ use crate::moments::RFactor;
 
 /// What a stochastic step delivers, in the scaled units and the state basis of the deterministic part.
 #[derive(Debug, Clone)]
-pub struct StochasticPart {
+pub(crate) struct StochasticPart {
     /// Observer gain `K`, `n x l`.
-    pub gain: DMatrix<f64>,
+    pub(crate) gain: DMatrix<f64>,
     /// Covariance of the innovations, `l x l`.
-    pub innovation_covariance: DMatrix<f64>,
+    pub(crate) innovation_covariance: DMatrix<f64>,
 }
 
 impl Stochastic {
     /// Past window of the data factor that [`Stochastic::estimate`] takes.
-    pub fn window(self, windows: &Windows) -> usize {
+    pub(crate) fn window(self, windows: &Windows) -> usize {
         match self {
             Self::Innovations => windows.factor.past,
             Self::FirstColumn | Self::Cholesky => windows.factor.past + windows.future - 1,
@@ -46,7 +46,7 @@ impl Stochastic {
     ///
     /// # Errors
     /// [`IdentifyError`] when the data do not determine it.
-    pub fn estimate(
+    pub(crate) fn estimate(
         self,
         deterministic: &StateSpace,
         windows: &Windows,
@@ -69,7 +69,7 @@ impl Stochastic {
     ///
     /// # Errors
     /// [`IdentifyError::Linalg`] when a factorisation fails.
-    pub fn propagation(
+    pub(crate) fn propagation(
         self,
         system: &StateSpace,
         windows: &Windows,
@@ -84,7 +84,7 @@ impl Stochastic {
     }
 
     /// The method whose deterministic part is `inner`, with this stochastic step in the place of its own.
-    pub fn instead_of_own(self, inner: Decomposed, windows: Windows) -> Decomposed {
+    pub(crate) fn instead_of_own(self, inner: Decomposed, windows: Windows) -> Decomposed {
         combined::combined(self, inner, windows)
     }
 }

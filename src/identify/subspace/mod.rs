@@ -14,12 +14,11 @@ mod truncation;
 mod varx;
 mod weighted;
 
-pub use nested::{
-    Nested, NestedDecomposition, Prediction, decompose_nested, nested_system_matrices,
-};
-pub use pbsid_opt::{Decomposition, Estimate, Weight, decompose, system_matrices};
+pub use nested::Prediction;
+pub(crate) use nested::{Nested, NestedDecomposition, decompose_nested, nested_system_matrices};
+pub(crate) use pbsid_opt::Decomposition;
+pub use pbsid_opt::{Estimate, Weight, decompose, system_matrices};
 pub(crate) use truncation::{
     LARGEST_FOR_POLISH, past_for_truncation, state_covariance, truncation,
 };
 pub use varx::{Varx, varx};
-pub use weighted::WeightedSvd;

@@ -40,17 +40,17 @@ pub enum Prediction {
 
 /// Coefficients of the nested regressions of a past window `p` and a future window `f`.
 #[derive(Debug, Clone)]
-pub struct Nested {
+pub(crate) struct Nested {
     /// `Theta_k`, `k = 0 ..= f`, `l x ((p + k) q (+ r))`, oldest block first.
-    pub coefficients: Vec<DMatrix<f64>>,
+    pub(crate) coefficients: Vec<DMatrix<f64>>,
     /// Residual covariance of each, `l x l`, per window (no degrees of freedom taken off: these are weights).
-    pub residual_covariances: Vec<DMatrix<f64>>,
+    pub(crate) residual_covariances: Vec<DMatrix<f64>>,
     /// Data of the first `p + 1` blocks.
-    pub leading: RFactor,
+    pub(crate) leading: RFactor,
     /// Vector ARX model of the past window, over the same windows: `Theta_0` with its residuals.
-    pub varx: Varx,
+    pub(crate) varx: Varx,
     /// Future window.
-    pub future: usize,
+    pub(crate) future: usize,
 }
 
 impl Nested {
@@ -58,7 +58,11 @@ impl Nested {
     ///
     /// # Errors
     /// [`IdentifyError::TooShortForWindows`] when there are not more windows than regressors.
-    pub fn new(factor: &RFactor, past: usize, feedthrough: bool) -> Result<Self, IdentifyError> {
+    pub(crate) fn new(
+        factor: &RFactor,
+        past: usize,
+        feedthrough: bool,
+    ) -> Result<Self, IdentifyError> {
         let (q, inputs, outputs) = (factor.channels(), factor.inputs, factor.outputs);
         let future = factor.past - past;
         let direct = if feedthrough { inputs } else { 0 };
@@ -109,13 +113,13 @@ impl Nested {
     }
 
     /// Number of windows.
-    pub fn columns(&self) -> usize {
+    pub(crate) fn columns(&self) -> usize {
         self.leading.columns
     }
 
     /// Predictions of the `f` outputs after `past` samples from those samples, `f l x past q`; `past` is `p`, or
     /// `p + 1` for the next state.
-    pub fn predictions(&self, prediction: Prediction, past: usize) -> DMatrix<f64> {
+    pub(crate) fn predictions(&self, prediction: Prediction, past: usize) -> DMatrix<f64> {
         let (q, outputs) = (self.leading.channels(), self.leading.outputs);
         let shift = past - self.leading.past;
         let mut out = DMatrix::zeros(self.future * outputs, past * q);
@@ -155,7 +159,7 @@ impl Nested {
     ///
     /// # Errors
     /// [`IdentifyError::Linalg`] when a residual covariance is singular.
-    pub fn noise_root(&self, prediction: Prediction) -> Result<DMatrix<f64>, IdentifyError> {
+    pub(crate) fn noise_root(&self, prediction: Prediction) -> Result<DMatrix<f64>, IdentifyError> {
         let outputs = self.leading.outputs;
         let order = self.future * outputs;
         let mut root = DMatrix::zeros(order, order);
@@ -181,20 +185,20 @@ impl Nested {
 
 /// What all orders of one method, past and future window share.
 #[derive(Debug, Clone)]
-pub struct NestedDecomposition {
+pub(crate) struct NestedDecomposition {
     prediction: Prediction,
     /// Predictions from `p` and from `p + 1` samples.
     from_past: DMatrix<f64>,
     from_longer_past: DMatrix<f64>,
     /// Of the weighted predictions.
-    pub svd: WeightedSvd,
+    pub(crate) svd: WeightedSvd,
 }
 
 /// Weighted singular value decomposition of the predictions.
 ///
 /// # Errors
 /// [`IdentifyError::Linalg`] when the decomposition does not converge.
-pub fn decompose_nested(
+pub(crate) fn decompose_nested(
     nested: &Nested,
     prediction: Prediction,
     weight: Weight,
@@ -225,7 +229,7 @@ pub fn decompose_nested(
 
 impl NestedDecomposition {
     /// Which algorithm it is of.
-    pub fn prediction(&self) -> Prediction {
+    pub(crate) fn prediction(&self) -> Prediction {
         self.prediction
     }
 }
@@ -234,7 +238,7 @@ impl NestedDecomposition {
 ///
 /// # Errors
 /// [`IdentifyError::SingularRegression`] when the states are dependent.
-pub fn nested_system_matrices(
+pub(crate) fn nested_system_matrices(
     nested: &Nested,
     decomposition: &NestedDecomposition,
     state_map: DMatrix<f64>,

@@ -21,8 +21,10 @@ mod propagation;
 mod subspace;
 
 pub use asymptotic::{AsymptoticMethod, asymptotic_covariance};
-pub use nested_errors::NestedErrors;
+pub(crate) use nested_errors::NestedErrors;
 pub(super) use nested_errors::newest_first;
-pub use propagation::Propagation;
+pub(crate) use propagation::Propagation;
+#[cfg(feature = "cli")]
 pub(crate) use subspace::jacobian_with_sign;
-pub use subspace::{subspace_covariance, subspace_jacobian, subspace_propagation};
+pub(crate) use subspace::subspace_propagation;
+pub use subspace::{subspace_covariance, subspace_jacobian};

@@ -35,27 +35,27 @@ use crate::model::StateSpace;
 
 /// What the errors of a nested estimate follow from: estimated, or exact.
 #[derive(Debug, Clone)]
-pub struct NestedErrors<'a> {
+pub(crate) struct NestedErrors<'a> {
     /// Which algorithm.
-    pub prediction: Prediction,
+    pub(crate) prediction: Prediction,
     /// The system, in the basis of `state_map`.
-    pub system: &'a StateSpace,
+    pub(crate) system: &'a StateSpace,
     /// Covariance of the innovations.
-    pub innovation_covariance: &'a DMatrix<f64>,
+    pub(crate) innovation_covariance: &'a DMatrix<f64>,
     /// `S`, `n x f l`.
-    pub state_map: &'a DMatrix<f64>,
+    pub(crate) state_map: &'a DMatrix<f64>,
     /// `zeta [x; u; e]^+`, `(p+1) q x (n + r + l)`, oldest block first.
-    pub state_regression: &'a DMatrix<f64>,
+    pub(crate) state_regression: &'a DMatrix<f64>,
     /// `zeta [x; (u)]^+`, `(p+1) q x (n (+ r))`.
-    pub output_regression: &'a DMatrix<f64>,
+    pub(crate) output_regression: &'a DMatrix<f64>,
     /// Upper triangular factor of the covariance of `w` (newest block first), one window's worth.
-    pub window_factor: &'a DMatrix<f64>,
+    pub(crate) window_factor: &'a DMatrix<f64>,
     /// Number of windows.
-    pub columns: f64,
+    pub(crate) columns: f64,
     /// Past window.
-    pub past: usize,
+    pub(crate) past: usize,
     /// Whether `D` is estimated.
-    pub feedthrough: bool,
+    pub(crate) feedthrough: bool,
 }
 
 /// Columns of a factor of `blocks` blocks of `channels` channels (and, with feedthrough, the inputs of one block
@@ -115,7 +115,7 @@ impl NestedErrors<'_> {
     ///
     /// # Errors
     /// [`LinalgError`] when the innovation covariance cannot be decomposed.
-    pub fn propagation(&self) -> Result<Propagation, LinalgError> {
+    pub(crate) fn propagation(&self) -> Result<Propagation, LinalgError> {
         let layout = ParameterLayout::of(self.system, self.feedthrough);
         let (n, outputs) = (layout.states, layout.outputs);
         let q = self.channels();

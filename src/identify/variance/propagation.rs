@@ -6,11 +6,11 @@ use crate::covariance::ParameterLayout;
 
 /// First-order errors as a linear function of white noise `w` of unit covariance.
 #[derive(Debug, Clone)]
-pub struct Propagation {
+pub(crate) struct Propagation {
     /// How the parameters are laid out.
-    pub layout: ParameterLayout,
+    pub(crate) layout: ParameterLayout,
     /// Errors of the parameters, `theta x w`: `Cov = P P'`.
-    pub parameters: DMatrix<f64>,
+    pub(crate) parameters: DMatrix<f64>,
     /// Errors of the vector ARX coefficients, `vec` of an `l x m` matrix, in the same noise.
-    pub coefficients: DMatrix<f64>,
+    pub(crate) coefficients: DMatrix<f64>,
 }

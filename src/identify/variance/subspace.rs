@@ -165,7 +165,10 @@ pub fn subspace_covariance(
 ///
 /// # Errors
 /// [`LinalgError`] when the innovation covariance cannot be decomposed.
-pub fn subspace_propagation(estimate: &Estimate, varx: &Varx) -> Result<Propagation, LinalgError> {
+pub(crate) fn subspace_propagation(
+    estimate: &Estimate,
+    varx: &Varx,
+) -> Result<Propagation, LinalgError> {
     let (layout, jacobian) = subspace_jacobian(estimate, varx);
     let of_coefficients = DMatrix::identity(jacobian.ncols(), jacobian.ncols());
     Ok(Propagation {

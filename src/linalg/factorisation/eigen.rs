@@ -10,13 +10,13 @@ use crate::linalg::finite::all_finite;
 
 /// Eigenvalues of a real matrix with right and left eigenvectors.
 #[derive(Debug, Clone)]
-pub struct Eigen {
+pub(crate) struct Eigen {
     /// Eigenvalues.
-    pub values: Vec<Complex64>,
+    pub(crate) values: Vec<Complex64>,
     /// Right eigenvectors as columns: `A v = lambda v`.
-    pub right: DMatrix<Complex64>,
+    pub(crate) right: DMatrix<Complex64>,
     /// Left eigenvectors as rows, scaled so that `w v = 1`: `w A = lambda w`.
-    pub left: DMatrix<Complex64>,
+    pub(crate) left: DMatrix<Complex64>,
 }
 
 /// Eigenvalues and orthonormal eigenvectors of a symmetric matrix, values in increasing order.
@@ -48,7 +48,7 @@ fn no_convergence(matrix: &DMatrix<f64>) -> LinalgError {
 ///
 /// # Errors
 /// [`LinalgError::NotFinite`] or [`LinalgError::NoConvergence`].
-pub fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex64>, LinalgError> {
+pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex64>, LinalgError> {
     check_finite(matrix, "eigenvalues")?;
     if matrix.is_empty() {
         return Ok(Vec::new());
@@ -75,7 +75,7 @@ fn numbers(
 /// Largest modulus of the eigenvalues (0 for an empty matrix).
 ///
 /// # Errors
-/// As [`eigenvalues`].
+/// As `eigenvalues`.
 pub fn spectral_radius(matrix: &DMatrix<f64>) -> Result<f64, LinalgError> {
     Ok(eigenvalues(matrix)?
         .iter()
@@ -88,7 +88,7 @@ pub fn spectral_radius(matrix: &DMatrix<f64>) -> Result<f64, LinalgError> {
 /// # Errors
 /// [`LinalgError::Singular`] when the matrix is defective to working precision (a multiple eigenvalue
 /// without its own eigenvectors), [`LinalgError::NotFinite`] or [`LinalgError::NoConvergence`].
-pub fn eigen(matrix: &DMatrix<f64>) -> Result<Eigen, LinalgError> {
+pub(crate) fn eigen(matrix: &DMatrix<f64>) -> Result<Eigen, LinalgError> {
     check_finite(matrix, "eigenvectors")?;
     let n = matrix.nrows();
     if n == 0 {
@@ -142,7 +142,7 @@ const SMALLEST_PENCIL: usize = 4;
 ///
 /// # Errors
 /// [`LinalgError::NotFinite`] or [`LinalgError::NoConvergence`].
-pub fn generalised_eigenvalues(
+pub(crate) fn generalised_eigenvalues(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
 ) -> Result<Vec<(Complex64, Complex64)>, LinalgError> {

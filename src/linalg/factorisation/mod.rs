@@ -7,12 +7,10 @@ mod singular;
 mod triangular;
 
 pub use cholesky::{cholesky_upper, symmetric_square_root_factor};
-pub use eigen::{
-    Eigen, SymmetricEigen, eigen, eigenvalues, generalised_eigenvalues, spectral_radius,
-    symmetric_eigen,
-};
-pub use qr::{least_squares, qr_r, qr_thin};
-pub use singular::{Svd, pseudo_inverse, svd_thin};
-pub use triangular::{
-    reciprocal_condition_upper, solve_upper, solve_upper_right, solve_upper_transposed,
-};
+pub(crate) use eigen::{eigen, eigenvalues, generalised_eigenvalues};
+pub use eigen::{spectral_radius, symmetric_eigen};
+pub(crate) use qr::{least_squares, qr_r, qr_thin};
+pub use singular::pseudo_inverse;
+pub(crate) use singular::{Svd, svd_thin};
+pub use triangular::solve_upper_transposed;
+pub(crate) use triangular::{reciprocal_condition_upper, solve_upper, solve_upper_right};

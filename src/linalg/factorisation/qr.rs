@@ -9,7 +9,7 @@ use crate::linalg::product::multiply_tn;
 
 /// The `min(m, n) x n` upper triangular factor of an `m x n` matrix, rows signed so that the diagonal
 /// is not negative (which makes it the Cholesky factor of the Gram matrix).
-pub fn qr_r(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn qr_r(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let factorisation = view(matrix).qr();
     let mut r = owned(factorisation.thin_R());
     for i in 0..r.nrows() {
@@ -24,7 +24,7 @@ pub fn qr_r(matrix: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Thin `Q` (`m x k`) and `R` (`k x n`), `k = min(m, n)`.
-pub fn qr_thin(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+pub(crate) fn qr_thin(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
     let factorisation = view(matrix).qr();
     let mut r = owned(factorisation.thin_R());
     for i in 0..r.nrows() {
@@ -39,7 +39,10 @@ pub fn qr_thin(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
 ///
 /// # Errors
 /// [`LinalgError::Singular`] when the columns of `A` are dependent to working precision.
-pub fn least_squares(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<DMatrix<f64>, LinalgError> {
+pub(crate) fn least_squares(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+) -> Result<DMatrix<f64>, LinalgError> {
     let (q, r) = qr_thin(a);
     if r.nrows() < r.ncols() || reciprocal_condition_upper(&r) < f64::EPSILON {
         return Err(LinalgError::Singular {

@@ -8,20 +8,20 @@ use crate::linalg::finite::all_finite;
 
 /// Thin singular value decomposition `A = U diag(s) V'`, singular values in decreasing order.
 #[derive(Debug, Clone)]
-pub struct Svd {
+pub(crate) struct Svd {
     /// Left singular vectors, `m x k`.
-    pub u: DMatrix<f64>,
+    pub(crate) u: DMatrix<f64>,
     /// Singular values, `k`, decreasing.
-    pub values: DVector<f64>,
+    pub(crate) values: DVector<f64>,
     /// Right singular vectors, `n x k` (not transposed).
-    pub v: DMatrix<f64>,
+    pub(crate) v: DMatrix<f64>,
 }
 
 /// Thin singular value decomposition.
 ///
 /// # Errors
 /// [`LinalgError::NotFinite`] for a matrix with NaN or infinity, [`LinalgError::NoConvergence`].
-pub fn svd_thin(matrix: &DMatrix<f64>) -> Result<Svd, LinalgError> {
+pub(crate) fn svd_thin(matrix: &DMatrix<f64>) -> Result<Svd, LinalgError> {
     if !all_finite(matrix) {
         return Err(LinalgError::NotFinite {
             what: "singular value decomposition",
@@ -45,7 +45,7 @@ pub fn svd_thin(matrix: &DMatrix<f64>) -> Result<Svd, LinalgError> {
 /// Moore-Penrose inverse; singular values below `relative_tolerance` times the largest count as zero.
 ///
 /// # Errors
-/// As [`svd_thin`].
+/// As `svd_thin`.
 pub fn pseudo_inverse(
     matrix: &DMatrix<f64>,
     relative_tolerance: f64,

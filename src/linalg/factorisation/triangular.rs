@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::linalg::exchange::view;
 
 /// `R^-1 B` for upper triangular `R` (what lies below its diagonal is not read).
-pub fn solve_upper(r: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn solve_upper(r: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let mut x = b.clone();
     let (rows, columns) = x.shape();
     solve_upper_triangular_in_place(
@@ -33,7 +33,7 @@ pub fn solve_upper_transposed(r: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64
 }
 
 /// `B R^-1` for upper triangular `R`.
-pub fn solve_upper_right(b: &DMatrix<f64>, r: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn solve_upper_right(b: &DMatrix<f64>, r: &DMatrix<f64>) -> DMatrix<f64> {
     solve_upper_transposed(r, &b.transpose()).transpose()
 }
 
@@ -42,7 +42,7 @@ pub fn solve_upper_right(b: &DMatrix<f64>, r: &DMatrix<f64>) -> DMatrix<f64> {
 /// The norm of the inverse is estimated from a few solves (Hager 1984, Higham 1988), which is what
 /// LAPACK's `dtrcon` reports; the estimate is a lower bound of the norm, almost always within a factor
 /// of three.
-pub fn reciprocal_condition_upper(r: &DMatrix<f64>) -> f64 {
+pub(crate) fn reciprocal_condition_upper(r: &DMatrix<f64>) -> f64 {
     let n = r.nrows();
     if n == 0 {
         return 1.0;

@@ -10,7 +10,6 @@ mod layout;
 mod reader;
 pub(crate) mod whole;
 
-pub use reader::{
-    BLOCK_ROWS, Block, LogReader, LogSummary, check_same_channels, check_same_sampling,
-};
+pub(crate) use reader::{BLOCK_ROWS, check_same_channels, check_same_sampling};
+pub use reader::{Block, LogReader, LogSummary};
 pub(crate) use whole::Whole;

@@ -8,7 +8,7 @@ use crate::log::text::{Channel, Header, Lines, RowParser, Source, Stream};
 use crate::log::time::{Sampling, first_look, time_base};
 
 /// Rows in a block; only the last of a recording has fewer.
-pub const BLOCK_ROWS: usize = 16_384;
+pub(crate) const BLOCK_ROWS: usize = 16_384;
 
 /// How far the sample times of experiments identified together may differ, relative to the first's.
 const SAME_SAMPLING: f64 = 1e-3;
@@ -64,7 +64,6 @@ pub struct LogReader {
     /// `None` when the sample time is given.
     sampling: Option<Sampling>,
     sample_time: Option<f64>,
-    has_time: bool,
     times: Vec<f64>,
     samples: usize,
     done: bool,
@@ -133,7 +132,6 @@ impl LogReader {
             outputs,
             sampling,
             sample_time: roles.sample_time,
-            has_time: assigned.time.is_some(),
             times: Vec::new(),
             samples: 0,
             done: false,
@@ -155,27 +153,22 @@ impl LogReader {
         &self.outputs
     }
 
-    /// Whether the file has a time column, read or not.
-    pub fn has_time(&self) -> bool {
-        self.has_time
-    }
-
     /// Samples read so far.
     pub fn samples(&self) -> usize {
         self.samples
     }
 
     /// Raw bytes read so far, for a progress bar.
-    pub fn bytes_read(&self) -> u64 {
+    pub(crate) fn bytes_read(&self) -> u64 {
         self.lines.stream().bytes_read()
     }
 
     /// Raw bytes in all, when the source is a file.
-    pub fn bytes_total(&self) -> Option<u64> {
+    pub(crate) fn bytes_total(&self) -> Option<u64> {
         self.lines.stream().bytes_total()
     }
 
-    /// Clears `block` and fills it with the next [`BLOCK_ROWS`] samples, or those that are left; `false` when none is.
+    /// Clears `block` and fills it with the next `BLOCK_ROWS` samples, or those that are left; `false` when none is.
     ///
     /// # Errors
     /// A row that is not as it should be, or a time base that is not uniform; after an error, the reader is at its end.
@@ -294,7 +287,7 @@ impl LogReader {
 ///
 /// # Errors
 /// The names or the units differ.
-pub fn check_same_channels(
+pub(crate) fn check_same_channels(
     first: &str,
     expected: &[Channel],
     name: &str,
@@ -333,7 +326,7 @@ pub fn check_same_channels(
 ///
 /// # Errors
 /// The sample times (seconds) differ by more.
-pub fn check_same_sampling(
+pub(crate) fn check_same_sampling(
     first: &str,
     expected: f64,
     name: &str,

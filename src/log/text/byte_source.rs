@@ -108,7 +108,7 @@ impl fmt::Display for Source {
 
 impl Source {
     /// Whether a second reading gives the same bytes: that of a file does, a pipe has none left.
-    pub fn can_be_read_again(&self) -> bool {
+    pub(crate) fn can_be_read_again(&self) -> bool {
         match self {
             Self::Stdin => false,
             // What is not there any more fails with its own message.

@@ -24,6 +24,6 @@ pub(crate) use resample::Resampling;
 pub(crate) use sampling::{STEP_TOLERANCE, Sampling, readable, time_base};
 pub(crate) use stamp::Format;
 pub(crate) use stamped_rows::{Rows, counted};
-pub use stamps::Origin;
+pub(crate) use stamps::Origin;
 pub(crate) use stamps::{Stamps, check_sample_time, first_look};
 pub(crate) use time_grid::Piece;

@@ -55,16 +55,16 @@ fn prepare<'r>(
 pub(super) struct Deviance<'p, 'a> {
     problem: &'p Problem<'a>,
     form: Form,
-    pub noise: Noise,
+    pub(super) noise: Noise,
     /// True when the gain of the observer stays as it is: its derivatives are not computed.
-    pub gain_held: bool,
-    pub slopes: Slopes,
+    pub(super) gain_held: bool,
+    pub(super) slopes: Slopes,
     last: Option<Runs>,
     accepted: Option<Runs>,
 }
 
 impl<'p, 'a> Deviance<'p, 'a> {
-    pub fn new(problem: &'p Problem<'a>, form: Form, noise: Noise) -> Self {
+    pub(crate) fn new(problem: &'p Problem<'a>, form: Form, noise: Noise) -> Self {
         Self {
             problem,
             form,
@@ -112,7 +112,7 @@ impl<'p, 'a> Deviance<'p, 'a> {
     }
 
     /// Outputs at a point.
-    pub fn simulated(&self, point: &[f64]) -> Option<Series> {
+    pub(crate) fn simulated(&self, point: &[f64]) -> Option<Series> {
         Some(
             self.runs(point)?
                 .into_iter()
@@ -122,12 +122,12 @@ impl<'p, 'a> Deviance<'p, 'a> {
     }
 
     /// Recording minus prediction.
-    pub fn residual(&self, point: &[f64]) -> Option<Series> {
+    pub(crate) fn residual(&self, point: &[f64]) -> Option<Series> {
         self.run(point).map(|r| r.residual)
     }
 
     /// White noise of the size of the residual at a point.
-    pub fn rescale(&self, point: &[f64]) -> Option<Noise> {
+    pub(crate) fn rescale(&self, point: &[f64]) -> Option<Noise> {
         Some(Noise::white(
             &self.residual(point)?,
             self.problem.outputs(),
@@ -206,13 +206,13 @@ impl<'p, 'a> Deviance<'p, 'a> {
     }
 
     /// Whitened derivatives of the predictions at a point: a row for each value that counts, a column for each free number.
-    pub fn derivatives(&mut self, point: &[f64]) -> Option<DMatrix<f64>> {
+    pub(crate) fn derivatives(&mut self, point: &[f64]) -> Option<DMatrix<f64>> {
         let runs = self.at(point)?;
         Some(self.jacobian(&runs, Slopes::Exact)?.0)
     }
 
     /// Covariances of the free numbers.
-    pub fn covariances(&mut self, point: &[f64]) -> Covariances {
+    pub(crate) fn covariances(&mut self, point: &[f64]) -> Covariances {
         let m = point.len();
         let nothing_known = || DMatrix::from_diagonal_element(m, m, f64::INFINITY);
         let jacobian = self
@@ -283,9 +283,9 @@ impl<'p, 'a> Deviance<'p, 'a> {
 /// Covariances of the free numbers.
 pub(super) struct Covariances {
     /// With the numbers of the noise model estimated beside them: under feedback these estimates are correlated.
-    pub joint: DMatrix<f64>,
+    pub(super) joint: DMatrix<f64>,
     /// With the noise model given.
-    pub given_noise: DMatrix<f64>,
+    pub(super) given_noise: DMatrix<f64>,
 }
 
 impl Objective for Deviance<'_, '_> {

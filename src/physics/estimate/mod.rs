@@ -211,14 +211,14 @@ fn stopped(plant: &dyn Simulated) -> Option<EstimateError> {
 /// A fit in one of the forms.
 #[derive(Debug, Clone)]
 pub(crate) struct Fit {
-    pub form: Form,
+    pub(crate) form: Form,
     /// Parameters, initial states, and the gain where there is one.
-    pub point: Vec<f64>,
-    pub noise: Noise,
+    pub(crate) point: Vec<f64>,
+    pub(crate) noise: Noise,
     /// `-2 log` likelihood.
-    pub deviance: f64,
+    pub(crate) deviance: f64,
     /// Schwarz's criterion.
-    pub criterion: f64,
+    pub(crate) criterion: f64,
 }
 
 /// The fit in innovation form, unless free run is the better form on the first part of the recordings already.

@@ -22,20 +22,20 @@ pub(super) trait Objective {
 /// Bounds of a free number, and a magnitude for one whose value is 0.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Range {
-    pub min: f64,
-    pub max: f64,
+    pub(super) min: f64,
+    pub(super) max: f64,
     /// The largest change in one step.
-    pub reach: f64,
+    pub(super) reach: f64,
 }
 
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
-    pub iterations: usize,
+    pub(crate) iterations: usize,
     /// Decrease of the deviance below which the search ends.
-    pub settled: f64,
+    pub(crate) settled: f64,
     /// Attempts at one step.
-    pub attempts: usize,
+    pub(crate) attempts: usize,
 }
 
 /// Added to a curvature of 1: what the data do not determine stays where it is.

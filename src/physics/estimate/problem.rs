@@ -86,23 +86,23 @@ impl From<RunError> for EstimateError {
 
 /// Recordings, plant and what is free.
 pub(super) struct Problem<'a> {
-    pub plant: Arc<dyn Simulated>,
-    pub recordings: &'a [PlantRecording],
+    pub(super) plant: Arc<dyn Simulated>,
+    pub(super) recordings: &'a [PlantRecording],
     options: &'a EstimateOptions,
-    pub mask: Mask,
+    pub(super) mask: Mask,
     /// Places of the free parameters.
-    pub free: Vec<usize>,
+    pub(super) free: Vec<usize>,
     /// Places of the states whose start is free.
-    pub starts: Vec<usize>,
+    pub(super) starts: Vec<usize>,
     /// Ramps of the switches, for each recording.
-    pub plans: Vec<Plan>,
+    pub(super) plans: Vec<Plan>,
     nominal: Point,
 }
 
 /// Columns of a recording, borrowed.
 pub(super) struct Columns<'a> {
-    pub inputs: Vec<&'a [f64]>,
-    pub outputs: Vec<&'a [f64]>,
+    pub(super) inputs: Vec<&'a [f64]>,
+    pub(super) outputs: Vec<&'a [f64]>,
 }
 
 impl PlantRecording {
@@ -127,7 +127,7 @@ fn mask(recordings: &[PlantRecording]) -> Mask {
 }
 
 impl<'a> Problem<'a> {
-    pub fn new(
+    pub(crate) fn new(
         plant: &dyn Simulated,
         recordings: &'a [PlantRecording],
         options: &'a EstimateOptions,
@@ -188,7 +188,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The first samples of each recording: as many as `count` makes of its length.
-    pub fn parts(&self, count: impl Fn(usize) -> usize) -> Vec<PlantRecording> {
+    pub(crate) fn parts(&self, count: impl Fn(usize) -> usize) -> Vec<PlantRecording> {
         let cut = |columns: &[Vec<f64>]| {
             columns
                 .iter()
@@ -204,7 +204,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The same problem on other recordings.
-    pub fn with_recordings<'b>(&self, recordings: &'b [PlantRecording]) -> Problem<'b>
+    pub(crate) fn with_recordings<'b>(&self, recordings: &'b [PlantRecording]) -> Problem<'b>
     where
         'a: 'b,
     {
@@ -221,7 +221,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Why the values of the text cannot be simulated.
-    pub fn why_not(&self) -> EstimateError {
+    pub(crate) fn why_not(&self) -> EstimateError {
         for r in self.recordings {
             let columns = r.columns();
             if let Err(e) = self
@@ -235,14 +235,18 @@ impl<'a> Problem<'a> {
     }
 
     /// Columns of each recording.
-    pub fn columns(&self) -> Vec<Columns<'_>> {
+    pub(crate) fn columns(&self) -> Vec<Columns<'_>> {
         self.recordings
             .iter()
             .map(PlantRecording::columns)
             .collect()
     }
 
-    pub fn excitation<'b>(&self, r: &PlantRecording, columns: &'b Columns<'b>) -> Excitation<'b> {
+    pub(crate) fn excitation<'b>(
+        &self,
+        r: &PlantRecording,
+        columns: &'b Columns<'b>,
+    ) -> Excitation<'b> {
         Excitation {
             inputs: &columns.inputs,
             length: r.samples(),
@@ -256,21 +260,21 @@ impl<'a> Problem<'a> {
         self.plant.spec()
     }
 
-    pub fn outputs(&self) -> usize {
+    pub(crate) fn outputs(&self) -> usize {
         self.spec().outputs().len()
     }
 
-    pub fn states(&self) -> usize {
+    pub(crate) fn states(&self) -> usize {
         self.spec().states().len()
     }
 
     /// Values that count.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.mask.iter().flatten().filter(|k| **k).count()
     }
 
     /// Free numbers at the values of the text: parameters, then the initial states of each recording.
-    pub fn nominal(&self) -> Vec<f64> {
+    pub(crate) fn nominal(&self) -> Vec<f64> {
         let start = self.plant.start(&self.nominal);
         let starts = self
             .recordings
@@ -284,7 +288,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Bounds of the free numbers.
-    pub fn ranges(&self) -> Vec<Range> {
+    pub(crate) fn ranges(&self) -> Vec<Range> {
         let spec = self.spec();
         let parameters = spec.parameters();
         let of_parameters = self.free.iter().map(|&i| {
@@ -323,7 +327,7 @@ impl<'a> Problem<'a> {
 
     /// Starts within the bounds, from a fixed seed: where a parameter has both bounds anywhere between, else within a factor
     /// of 3 of its value. What may be 0 is so in half of them: a plant with fewer terms has fewer summits.
-    pub fn draws(&self, count: usize) -> Vec<Vec<f64>> {
+    pub(crate) fn draws(&self, count: usize) -> Vec<Vec<f64>> {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
         let (nominal, ranges) = (self.nominal(), self.ranges());
         (0..count)
@@ -347,7 +351,7 @@ impl<'a> Problem<'a> {
 
     /// The values of the text with one parameter at 0, for each that may be 0, and the place of that parameter: a plant with
     /// a term less has fewer summits, and is never better than the whole one.
-    pub fn without_terms(&self) -> Vec<(Vec<f64>, Option<usize>)> {
+    pub(crate) fn without_terms(&self) -> Vec<(Vec<f64>, Option<usize>)> {
         let (nominal, ranges) = (self.nominal(), self.ranges());
         let may_vanish =
             |&i: &usize| nominal[i] != 0.0 && ranges[i].min <= 0.0 && 0.0 <= ranges[i].max;
@@ -367,12 +371,12 @@ impl<'a> Problem<'a> {
     }
 
     /// Whether noise is taken as white, whatever is left.
-    pub fn least_squares(&self) -> bool {
+    pub(crate) fn least_squares(&self) -> bool {
         self.options.least_squares
     }
 
     /// Noise model of what a free run leaves: white and Gaussian for least squares, else estimated.
-    pub fn noise(&self, residual: &Series) -> Noise {
+    pub(crate) fn noise(&self, residual: &Series) -> Noise {
         if self.least_squares() {
             Noise::white(residual, self.outputs(), &self.mask)
         } else {
@@ -381,7 +385,13 @@ impl<'a> Problem<'a> {
     }
 
     /// Values of a column that count, whitened as those of an output.
-    pub fn whiten(&self, noise: &Noise, output: usize, column: &[f64], mask: &[bool]) -> Vec<f64> {
+    pub(crate) fn whiten(
+        &self,
+        noise: &Noise,
+        output: usize,
+        column: &[f64],
+        mask: &[bool],
+    ) -> Vec<f64> {
         let mut series = vec![Vec::new(); self.outputs()];
         let mut masks = vec![Vec::new(); self.outputs()];
         series[output] = column.to_vec();
@@ -390,7 +400,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Parameters and initial states of each recording.
-    pub fn points(&self, numbers: &[f64]) -> Vec<Point> {
+    pub(crate) fn points(&self, numbers: &[f64]) -> Vec<Point> {
         (0..self.recordings.len())
             .map(|r| {
                 let mut point = self.nominal.clone();
@@ -407,20 +417,20 @@ impl<'a> Problem<'a> {
     }
 
     /// Schwarz's criterion.
-    pub fn criterion(&self, deviance: f64, of_noise: usize, of_gain: usize) -> f64 {
+    pub(crate) fn criterion(&self, deviance: f64, of_noise: usize, of_gain: usize) -> f64 {
         let numbers = self.nominal().len() + of_noise + of_gain;
         deviance + numbers as f64 * (self.count() as f64).ln()
     }
 
     /// Gain of the observer in the numbers behind the initial states.
-    pub fn gain(&self, numbers: &[f64]) -> DMatrix<f64> {
+    pub(crate) fn gain(&self, numbers: &[f64]) -> DMatrix<f64> {
         let (n, l) = (self.states(), self.outputs());
         let gain = &numbers[numbers.len() - n * l..];
         DMatrix::from_fn(n, l, |i, j| gain[i * l + j])
     }
 
     /// Standard deviations of the initial states of each recording; 0 where they are certain.
-    pub fn start_stds(&self, covariance: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    pub(crate) fn start_stds(&self, covariance: &DMatrix<f64>) -> Vec<Vec<f64>> {
         (0..self.recordings.len())
             .map(|r| {
                 let mut stds = vec![0.0; self.states()];
@@ -436,7 +446,7 @@ impl<'a> Problem<'a> {
 
 impl Problem<'_> {
     /// Names of the free parameters.
-    pub fn names(&self) -> Vec<String> {
+    pub(crate) fn names(&self) -> Vec<String> {
         let spec = self.spec();
         let parameters: Vec<_> = spec.of_kind(VariableKind::Parameter).collect();
         self.free
@@ -446,7 +456,7 @@ impl Problem<'_> {
     }
 
     /// Magnitude of each free parameter: the width of its bounds, or its value.
-    pub fn magnitudes(&self, point: &[f64]) -> Vec<f64> {
+    pub(crate) fn magnitudes(&self, point: &[f64]) -> Vec<f64> {
         let ranges = self.ranges();
         let nominal = self.nominal();
         (0..self.free.len())
@@ -458,7 +468,7 @@ impl Problem<'_> {
     }
 
     /// The excitation and outputs of each recording, for `of`.
-    pub fn each(&self, mut of: impl FnMut(&Excitation, &[&[f64]])) {
+    pub(crate) fn each(&self, mut of: impl FnMut(&Excitation, &[&[f64]])) {
         for r in self.recordings {
             let columns = r.columns();
             of(&self.excitation(r, &columns), &columns.outputs);

@@ -23,7 +23,7 @@ pub(crate) struct Study<'a> {
 }
 
 impl<'a> Study<'a> {
-    pub fn new(
+    pub(crate) fn new(
         plant: &'a Plant,
         recordings: &'a [PlantRecording],
         options: &'a EstimateOptions,
@@ -36,7 +36,7 @@ impl<'a> Study<'a> {
     }
 
     /// The same for another plant.
-    pub fn of(
+    pub(crate) fn of(
         &self,
         plant: &'a Plant,
         options: &'a EstimateOptions,
@@ -50,7 +50,7 @@ impl<'a> Study<'a> {
 
     /// The same where a value counts as this part of one with independent noise: least squares takes what a free run leaves
     /// as white, which it is not.
-    pub fn with_information(self, information: f64) -> Self {
+    pub(crate) fn with_information(self, information: f64) -> Self {
         Self {
             information,
             ..self
@@ -58,18 +58,18 @@ impl<'a> Study<'a> {
     }
 
     /// Information in a value, as a part of that in a value with independent noise.
-    pub fn information(&self) -> f64 {
+    pub(crate) fn information(&self) -> f64 {
         self.information
     }
 
     /// Effective samples of what a fit leaves, over all samples.
-    pub fn effective_share(&self, fit: &Fit) -> Option<f64> {
+    pub(crate) fn effective_share(&self, fit: &Fit) -> Option<f64> {
         let residual = self.residual(fit)?;
         Some(effective_samples(&residual, &self.problem.mask) / self.count().max(1) as f64)
     }
 
     /// Schwarz's criterion of a fit, with the information that values have here.
-    pub fn criterion(&self, fit: &Fit) -> f64 {
+    pub(crate) fn criterion(&self, fit: &Fit) -> f64 {
         let of_gain = fit.point.len() - self.problem.nominal().len();
         let numbers = self.problem.nominal().len() + fit.noise.len() + of_gain;
         let values = (self.information * self.count() as f64).max(1.0);
@@ -77,22 +77,22 @@ impl<'a> Study<'a> {
     }
 
     /// The free numbers as the text has them.
-    pub fn nominal(&self) -> Vec<f64> {
+    pub(crate) fn nominal(&self) -> Vec<f64> {
         self.problem.nominal()
     }
 
     /// The likelier form of free run and observer, as [`estimate`](super::estimate) finds it.
-    pub fn fit(&self, form: Option<Form>) -> Result<Fit, EstimateError> {
+    pub(crate) fn fit(&self, form: Option<Form>) -> Result<Fit, EstimateError> {
         Ok(best_fit(&self.problem, form)?.0)
     }
 
     /// Least squares in free run from a point.
-    pub fn least_squares(&self, from: &[f64]) -> Option<Fit> {
+    pub(crate) fn least_squares(&self, from: &[f64]) -> Option<Fit> {
         self.least_squares_with(from, SEARCH)
     }
 
     /// The same with a given effort.
-    pub fn least_squares_with(&self, from: &[f64], effort: Effort) -> Option<Fit> {
+    pub(crate) fn least_squares_with(&self, from: &[f64], effort: Effort) -> Option<Fit> {
         let mut point = from[..self.problem.nominal().len()].to_vec();
         let deviance = white_fit(&self.problem, &mut point, effort)?;
         let objective = Deviance::new(&self.problem, Form::FreeRun, Noise::unit(self.outputs()));
@@ -110,7 +110,7 @@ impl<'a> Study<'a> {
 
     /// A fit with the same parameters whose states are nearer to those of the plant: where a free run strays from the recording,
     /// an observer that keeps the states near what the outputs show.
-    pub fn along_recording(&self, fit: &Fit) -> Fit {
+    pub(crate) fn along_recording(&self, fit: &Fit) -> Fit {
         let numbers = self.problem.nominal().len();
         let white = self.gaussian(fit).filter(|w| w.form == Form::FreeRun);
         let observed = white.as_ref().and_then(|_| {
@@ -128,7 +128,7 @@ impl<'a> Study<'a> {
     }
 
     /// The same numbers under Gaussian noise of the size of the residual, where every value counts as much as any other.
-    pub fn gaussian(&self, fit: &Fit) -> Option<Fit> {
+    pub(crate) fn gaussian(&self, fit: &Fit) -> Option<Fit> {
         let residual = self.residual(fit)?;
         let noise = Noise::white(&residual, self.outputs(), self.mask());
         Some(Fit {
@@ -139,17 +139,17 @@ impl<'a> Study<'a> {
     }
 
     /// A fit from a point with the noise and the observer of another: a first comparison of candidates.
-    pub fn glance(&self, from: &Fit, effort: Effort) -> Option<Fit> {
+    pub(crate) fn glance(&self, from: &Fit, effort: Effort) -> Option<Fit> {
         self.fit_from(from, 0, effort, (Slopes::Frozen, true))
     }
 
     /// The same with an observer and a noise model of its own.
-    pub fn compare(&self, from: &Fit, effort: Effort) -> Option<Fit> {
+    pub(crate) fn compare(&self, from: &Fit, effort: Effort) -> Option<Fit> {
         self.fit_from(from, 1, effort, (Slopes::Frozen, false))
     }
 
     /// A fit from a point with the noise of another, and then `rounds` times with a noise model of its own.
-    pub fn refit(&self, from: &Fit, rounds: usize, effort: Effort) -> Option<Fit> {
+    pub(crate) fn refit(&self, from: &Fit, rounds: usize, effort: Effort) -> Option<Fit> {
         self.fit_from(from, rounds, effort, (Slopes::FrozenFirst, false))
     }
 
@@ -191,49 +191,49 @@ impl<'a> Study<'a> {
         Some(Fit { criterion, ..fit })
     }
 
-    pub fn outputs(&self) -> usize {
+    pub(crate) fn outputs(&self) -> usize {
         self.problem.outputs()
     }
 
     /// Number of values that are fitted.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.problem.count()
     }
 
     /// Length of the longest recording, in seconds.
-    pub fn duration(&self) -> f64 {
+    pub(crate) fn duration(&self) -> f64 {
         let of = |r: &PlantRecording| r.outputs[0].len() as f64 * r.sample_time;
         self.problem.recordings.iter().map(of).fold(0.0, f64::max)
     }
 
     /// Number of free parameters.
-    pub fn parameters(&self) -> usize {
+    pub(crate) fn parameters(&self) -> usize {
         self.problem.free.len()
     }
 
-    pub fn mask(&self) -> &Mask {
+    pub(crate) fn mask(&self) -> &Mask {
         &self.problem.mask
     }
 
     /// Recording minus prediction.
-    pub fn residual(&self, fit: &Fit) -> Option<Series> {
+    pub(crate) fn residual(&self, fit: &Fit) -> Option<Series> {
         Deviance::new(&self.problem, fit.form, fit.noise.clone()).residual(&fit.point)
     }
 
     /// Deviance with the noise of the fit.
-    pub fn deviance(&self, fit: &Fit) -> Option<f64> {
+    pub(crate) fn deviance(&self, fit: &Fit) -> Option<f64> {
         Some(fit.noise.deviance(&self.residual(fit)?, self.mask()))
     }
 
     /// Whitened derivatives of the predictions by the free numbers that are not at a bound.
-    pub fn derivatives(&self, fit: &Fit) -> Option<DMatrix<f64>> {
+    pub(crate) fn derivatives(&self, fit: &Fit) -> Option<DMatrix<f64>> {
         let all =
             Deviance::new(&self.problem, fit.form, fit.noise.clone()).derivatives(&fit.point)?;
         Some(all.select_columns(&self.inside(fit)))
     }
 
     /// The free numbers that are not at a bound, by their places.
-    pub fn inside(&self, fit: &Fit) -> Vec<usize> {
+    pub(crate) fn inside(&self, fit: &Fit) -> Vec<usize> {
         let ranges = self.problem.ranges();
         let inside = |i: &usize| {
             ranges
@@ -244,7 +244,7 @@ impl<'a> Study<'a> {
     }
 
     /// The numbers moved, within their bounds.
-    pub fn moved(&self, fit: &Fit, shift: &[f64]) -> Vec<f64> {
+    pub(crate) fn moved(&self, fit: &Fit, shift: &[f64]) -> Vec<f64> {
         let ranges = self.problem.ranges();
         let each = fit.point.iter().zip(shift).enumerate();
         let moved = each.map(|(i, (x, s))| match ranges.get(i) {
@@ -255,24 +255,24 @@ impl<'a> Study<'a> {
     }
 
     /// Covariance of the free numbers.
-    pub fn covariance(&self, fit: &Fit) -> DMatrix<f64> {
+    pub(crate) fn covariance(&self, fit: &Fit) -> DMatrix<f64> {
         let covariances =
             Deviance::new(&self.problem, fit.form, fit.noise.clone()).covariances(&fit.point);
         covariances.joint / self.information
     }
 
     /// Parameters and initial states of each recording.
-    pub fn points(&self, fit: &Fit) -> Vec<Point> {
+    pub(crate) fn points(&self, fit: &Fit) -> Vec<Point> {
         self.problem.points(&fit.point)
     }
 
     /// Gain of the observer, in the innovation form.
-    pub fn gain(&self, fit: &Fit) -> Option<DMatrix<f64>> {
+    pub(crate) fn gain(&self, fit: &Fit) -> Option<DMatrix<f64>> {
         (fit.form == Form::Innovation).then(|| self.problem.gain(&fit.point))
     }
 
     /// The predictions of each recording with their states.
-    pub fn trajectories(&self, fit: &Fit) -> Option<Vec<Trajectory>> {
+    pub(crate) fn trajectories(&self, fit: &Fit) -> Option<Vec<Trajectory>> {
         let gain = self.gain(fit);
         let columns = self.problem.columns();
         let each = self.problem.recordings.iter().zip(&columns);
@@ -291,20 +291,20 @@ impl<'a> Study<'a> {
     }
 
     /// Free run of each recording.
-    pub fn free_run(&self, fit: &Fit) -> Option<Series> {
+    pub(crate) fn free_run(&self, fit: &Fit) -> Option<Series> {
         let numbers = self.problem.nominal().len();
         Deviance::new(&self.problem, Form::FreeRun, fit.noise.clone())
             .simulated(&fit.point[..numbers])
     }
 
     /// Whether what a fit leaves of each output is smaller than its spread about its mean.
-    pub fn follows(&self, fit: &Fit) -> bool {
+    pub(crate) fn follows(&self, fit: &Fit) -> bool {
         self.residual(fit)
             .is_some_and(|residual| follows(&self.problem, &residual))
     }
 
     /// The plant.
-    pub fn plant(&self) -> &Plant {
+    pub(crate) fn plant(&self) -> &Plant {
         self.plant
     }
 }

@@ -55,7 +55,7 @@ pub(super) struct Cache {
 
 impl Cache {
     /// The key of a run.
-    pub fn key(&mut self, excitation: &Excitation, parameters: &[f64]) -> Key {
+    pub(crate) fn key(&mut self, excitation: &Excitation, parameters: &[f64]) -> Key {
         let known = self.recordings.iter().position(|r| r.is(excitation));
         let recording = known.unwrap_or_else(|| {
             self.recordings.push(Recording {
@@ -73,12 +73,12 @@ impl Cache {
         }
     }
 
-    pub fn get(&self, key: &Key) -> Option<Answer> {
+    pub(crate) fn get(&self, key: &Key) -> Option<Answer> {
         self.answers.get(key).cloned()
     }
 
     /// Keeps an answer; those of a batch are never removed for one another.
-    pub fn insert(&mut self, key: Key, answer: Answer) {
+    pub(crate) fn insert(&mut self, key: Key, answer: Answer) {
         self.bytes += size(&answer);
         self.order.push_back(key.clone());
         self.answers.insert(key, answer);

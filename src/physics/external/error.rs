@@ -112,7 +112,7 @@ pub enum Failure {
 
 impl Failure {
     /// Whether it has nothing to do with the values of the parameters, so that other values would fail alike.
-    pub fn is_final(&self) -> bool {
+    pub(crate) fn is_final(&self) -> bool {
         matches!(
             self,
             Self::NotStarted { .. }

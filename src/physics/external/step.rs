@@ -38,14 +38,14 @@ const ONLY_NOISE: f64 = 1.5;
 #[derive(Debug, Default)]
 pub(super) struct Steps {
     /// Error and spread of each output.
-    pub noise: Option<Vec<OutputNoise>>,
+    pub(super) noise: Option<Vec<OutputNoise>>,
     /// Step of each parameter as a part of its magnitude.
-    pub relative: Vec<Option<f64>>,
+    pub(super) relative: Vec<Option<f64>>,
 }
 
 impl Steps {
     /// Keeps the step of a parameter.
-    pub fn remember(&mut self, parameter: usize, relative: f64) {
+    pub(crate) fn remember(&mut self, parameter: usize, relative: f64) {
         if self.relative.len() <= parameter {
             self.relative.resize(parameter + 1, None);
         }
@@ -57,9 +57,9 @@ impl Steps {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct OutputNoise {
     /// Standard deviation of a value's error.
-    pub error: f64,
+    pub(super) error: f64,
     /// Standard deviation of the values about their mean.
-    pub spread: f64,
+    pub(super) spread: f64,
 }
 
 /// Noise of the outputs from one run and, where they succeeded, from those of parameters moved by equal steps.
@@ -146,11 +146,11 @@ pub(super) fn first(noise: &[OutputNoise]) -> f64 {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Change {
     /// Of the outputs at both ends.
-    pub first: f64,
+    pub(super) first: f64,
     /// Of the sum of both ends less twice the middle; none for a difference to one side.
-    pub second: Option<f64>,
+    pub(super) second: Option<f64>,
     /// Expected of `first` from noise alone.
-    pub noise: f64,
+    pub(super) noise: f64,
 }
 
 /// What is to be done with a difference.

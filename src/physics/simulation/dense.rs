@@ -9,7 +9,7 @@ pub(super) struct Factors {
 
 impl Factors {
     /// Factors the `n` by `n` matrix whose element `(i, j)` is `of(i, j)`. False when it is singular.
-    pub fn factor(&mut self, n: usize, of: impl Fn(usize, usize) -> f64) -> bool {
+    pub(crate) fn factor(&mut self, n: usize, of: impl Fn(usize, usize) -> f64) -> bool {
         self.matrix.clear();
         self.matrix.extend((0..n * n).map(|at| of(at / n, at % n)));
         self.pivots.clear();
@@ -41,7 +41,7 @@ impl Factors {
     }
 
     /// Solves for one right-hand side, in place.
-    pub fn solve(&self, right: &mut [f64]) {
+    pub(crate) fn solve(&self, right: &mut [f64]) {
         let n = right.len();
         for (k, &pivot) in self.pivots.iter().enumerate() {
             right.swap(k, pivot);

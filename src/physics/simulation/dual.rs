@@ -3,14 +3,14 @@
 /// Value and slopes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Dual<const M: usize> {
-    pub value: f64,
-    pub slope: [f64; M],
+    pub(super) value: f64,
+    pub(super) slope: [f64; M],
 }
 
 impl<const M: usize> Dual<M> {
     /// A number that depends on nothing.
     #[inline(always)]
-    pub fn constant(value: f64) -> Self {
+    pub(crate) fn constant(value: f64) -> Self {
         Self {
             value,
             slope: [0.0; M],
@@ -19,7 +19,7 @@ impl<const M: usize> Dual<M> {
 
     /// `self + factor * other`
     #[inline(always)]
-    pub fn plus(self, factor: f64, other: &Self) -> Self {
+    pub(crate) fn plus(self, factor: f64, other: &Self) -> Self {
         let mut sum = self;
         sum.value += factor * other.value;
         for (s, o) in sum.slope.iter_mut().zip(&other.slope) {
@@ -30,7 +30,7 @@ impl<const M: usize> Dual<M> {
 
     /// `self + factor * length * other`, for a length with slopes.
     #[inline(always)]
-    pub fn plus_product(self, factor: f64, length: &Self, other: &Self) -> Self {
+    pub(crate) fn plus_product(self, factor: f64, length: &Self, other: &Self) -> Self {
         let (s, t) = (factor * length.value, factor * other.value);
         let mut sum = self;
         sum.value += s * other.value;

@@ -18,8 +18,8 @@ enum Past<const M: usize> {
 
 /// Right-hand side with its inputs.
 pub(super) struct Field<'a, const M: usize> {
-    pub tape: &'a Tape,
-    pub frame: Frame<M>,
+    pub(super) tape: &'a Tape,
+    pub(super) frame: Frame<M>,
     jacobian: Frame<LANES>,
     excitation: &'a Excitation<'a>,
     sample: usize,
@@ -46,7 +46,7 @@ const WHOLE: f64 = 1e-9;
 
 impl<'a, const M: usize> Field<'a, M> {
     /// `frame` has parameters with their slopes.
-    pub fn new(tape: &'a Tape, mut frame: Frame<M>, excitation: &'a Excitation<'a>) -> Self {
+    pub(crate) fn new(tape: &'a Tape, mut frame: Frame<M>, excitation: &'a Excitation<'a>) -> Self {
         tape.run_parameters(&mut frame);
         let mut jacobian = tape.frame::<LANES>();
         jacobian.width.clone_from(&frame.width);
@@ -99,7 +99,7 @@ impl<'a, const M: usize> Field<'a, M> {
     }
 
     /// Takes the inputs of a sample.
-    pub fn begin(&mut self, sample: usize) {
+    pub(crate) fn begin(&mut self, sample: usize) {
         self.sample = sample;
         self.inputs(0.0);
     }
@@ -142,7 +142,7 @@ impl<'a, const M: usize> Field<'a, M> {
 
     /// Boundaries of the parts of a sample in which every delayed input is constant, as fractions of the sample. Delays of
     /// whole samples, or equal ones, make parts of length 0, whose slopes count.
-    pub fn boundaries(&self) -> Vec<Dual<M>> {
+    pub(crate) fn boundaries(&self) -> Vec<Dual<M>> {
         let mut jumps: Vec<&Jump<M>> = self.jumps.iter().filter(|j| j.rank > 0).collect();
         jumps.sort_by_key(|j| j.rank);
         let mut boundaries = vec![Dual::constant(0.0)];
@@ -152,7 +152,7 @@ impl<'a, const M: usize> Field<'a, M> {
     }
 
     /// Chooses the sample that each delayed input comes from: for a part between two boundaries, or at the sample itself.
-    pub fn part(&mut self, part: Option<usize>) {
+    pub(crate) fn part(&mut self, part: Option<usize>) {
         for (source, jump) in self.source.iter_mut().zip(&self.jumps) {
             let jumped = part.map_or(jump.phase.value == 0.0, |part| jump.rank <= part);
             *source = self
@@ -162,7 +162,7 @@ impl<'a, const M: usize> Field<'a, M> {
     }
 
     /// Derivatives of the states at an instant; the frame then holds all values.
-    pub fn evaluate(&mut self, time: &Dual<M>, x: &[Dual<M>], derivative: &mut [Dual<M>]) {
+    pub(crate) fn evaluate(&mut self, time: &Dual<M>, x: &[Dual<M>], derivative: &mut [Dual<M>]) {
         self.place(time);
         for (&slot, x) in self.tape.states.iter().zip(x) {
             self.frame.slot[slot] = *x;
@@ -191,7 +191,7 @@ impl<'a, const M: usize> Field<'a, M> {
     }
 
     /// Derivatives of the states and their Jacobian (by rows) at an instant, without the slopes in the `M` directions.
-    pub fn linearise(
+    pub(crate) fn linearise(
         &mut self,
         time: &Dual<M>,
         x: &[f64],
@@ -203,7 +203,7 @@ impl<'a, const M: usize> Field<'a, M> {
     }
 
     /// Outputs and their Jacobian by the states, likewise.
-    pub fn linearise_outputs(
+    pub(crate) fn linearise_outputs(
         &mut self,
         time: &Dual<M>,
         x: &[f64],
@@ -255,7 +255,7 @@ impl<'a, const M: usize> Field<'a, M> {
     }
 
     /// Keeps the delayed expressions of states at the end of a step.
-    pub fn remember(&mut self, time: f64) {
+    pub(crate) fn remember(&mut self, time: f64) {
         for (past, delay) in self.past.iter_mut().zip(&self.tape.delays) {
             if let Past::History(steps) = past {
                 steps.push((time, self.frame.slot[delay.value]));
@@ -264,12 +264,12 @@ impl<'a, const M: usize> Field<'a, M> {
     }
 
     /// True when a delayed expression of states must be kept at every step.
-    pub fn remembers(&self) -> bool {
+    pub(crate) fn remembers(&self) -> bool {
         self.tape.delays.iter().any(|d| !d.of_inputs)
     }
 
     /// The shortest delay of an expression of states: no step may be longer.
-    pub fn shortest_delay(&self) -> f64 {
+    pub(crate) fn shortest_delay(&self) -> f64 {
         let of_states = self.tape.delays.iter().filter(|d| !d.of_inputs);
         of_states
             .map(|d| self.frame.slot[d.time].value)
@@ -277,7 +277,7 @@ impl<'a, const M: usize> Field<'a, M> {
     }
 
     /// Argument of each switch now.
-    pub fn switches(&self, into: &mut Vec<f64>) {
+    pub(crate) fn switches(&self, into: &mut Vec<f64>) {
         into.clear();
         into.extend(self.tape.switches.iter().map(|s| self.frame.switch(s)));
     }

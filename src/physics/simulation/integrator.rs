@@ -15,18 +15,18 @@ pub(super) const IMPLICIT: u8 = 0x80;
 
 /// Where a run stands.
 pub(super) struct Integrator<'a, const M: usize> {
-    pub field: Field<'a, M>,
-    pub stages: Stages<M>,
-    pub x: Vec<Dual<M>>,
-    pub first: Vec<Dual<M>>,
-    pub next: Vec<Dual<M>>,
+    pub(super) field: Field<'a, M>,
+    pub(super) stages: Stages<M>,
+    pub(super) x: Vec<Dual<M>>,
+    pub(super) first: Vec<Dual<M>>,
+    pub(super) next: Vec<Dual<M>>,
     /// For a plant that is linear in its states.
-    pub propagator: Option<Propagator<M>>,
+    pub(super) propagator: Option<Propagator<M>>,
 }
 
 impl<const M: usize> Integrator<'_, M> {
     /// Takes the inputs of a sample and evaluates it.
-    pub fn sample(&mut self, k: usize, excitation: &Excitation) {
+    pub(crate) fn sample(&mut self, k: usize, excitation: &Excitation) {
         self.field.begin(k);
         self.field.part(None);
         let now = Dual::constant(excitation.time(k));
@@ -37,7 +37,7 @@ impl<const M: usize> Integrator<'_, M> {
     }
 
     /// Corrects the states as the observer does, and evaluates again.
-    pub fn correct(
+    pub(crate) fn correct(
         &mut self,
         k: usize,
         excitation: &Excitation,
@@ -68,7 +68,7 @@ impl<const M: usize> Integrator<'_, M> {
     }
 
     /// Parts of a sample between the jumps of delayed inputs: start and length, in seconds.
-    pub fn parts(&self, k: usize, excitation: &Excitation) -> Vec<(Dual<M>, Dual<M>)> {
+    pub(crate) fn parts(&self, k: usize, excitation: &Excitation) -> Vec<(Dual<M>, Dual<M>)> {
         let h = excitation.sample_time;
         let boundaries = self.field.boundaries();
         let origin = Dual::constant(excitation.time(k));
@@ -84,7 +84,7 @@ impl<const M: usize> Integrator<'_, M> {
     }
 
     /// To the next sample by matrices, where the plant is linear in its states; false where it is not.
-    pub fn propagate(&mut self, k: usize, excitation: &Excitation) -> bool {
+    pub(crate) fn propagate(&mut self, k: usize, excitation: &Excitation) -> bool {
         let Some(propagator) = &mut self.propagator else {
             return false;
         };
@@ -100,7 +100,7 @@ impl<const M: usize> Integrator<'_, M> {
     }
 
     /// Begins a part of a sample, by its place among the parts.
-    pub fn begin_part(&mut self, start: &Dual<M>, part: usize) {
+    pub(crate) fn begin_part(&mut self, start: &Dual<M>, part: usize) {
         if self.field.tape.delays.is_empty() {
             return; // evaluated with the sample
         }
@@ -108,7 +108,7 @@ impl<const M: usize> Integrator<'_, M> {
         self.field.evaluate(start, &self.x, &mut self.first);
     }
 
-    pub fn replay(
+    pub(crate) fn replay(
         &mut self,
         k: usize,
         excitation: &Excitation,

@@ -94,7 +94,7 @@ pub(super) enum Linearity {
 
 impl Linearity {
     /// Of the equations; switches and delays must have been excluded.
-    pub fn of(spec: &ModelSpec) -> Self {
+    pub(crate) fn of(spec: &ModelSpec) -> Self {
         let mut of_variable = vec![Dependence::NONE; spec.variables.len()];
         for (variable, known) in spec.variables.iter().zip(&mut of_variable) {
             match variable.kind {
@@ -135,7 +135,7 @@ impl Linearity {
         }
     }
 
-    pub fn holds(self, hold: Hold) -> bool {
+    pub(crate) fn holds(self, hold: Hold) -> bool {
         match self {
             Self::No => false,
             Self::Held => hold == Hold::Zero,
@@ -199,7 +199,7 @@ pub(super) struct Propagator<const M: usize> {
 
 impl<const M: usize> Propagator<M> {
     /// From the equations at the parameters of the frame.
-    pub fn new(field: &mut Field<M>, states: usize, sample_time: f64, hold: Hold) -> Self {
+    pub(crate) fn new(field: &mut Field<M>, states: usize, sample_time: f64, hold: Hold) -> Self {
         let n = states;
         let zero = Dual::constant(0.0);
         let now = Dual::constant(0.0);
@@ -258,7 +258,7 @@ impl<const M: usize> Propagator<M> {
     }
 
     /// States at the next sample; `rate` is their derivative at this one, and the field stands there.
-    pub fn advance(
+    pub(crate) fn advance(
         &mut self,
         field: &mut Field<M>,
         next_time: f64,

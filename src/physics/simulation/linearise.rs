@@ -41,7 +41,7 @@ impl LinearPlant {
     }
 
     /// The same of the system sampled every `sample_time` with its inputs held, at `w` rad/s.
-    pub fn sampled_response(&self, w: f64, sample_time: f64) -> DMatrix<Complex64> {
+    pub(crate) fn sampled_response(&self, w: f64, sample_time: f64) -> DMatrix<Complex64> {
         let (a, b) = self.discrete(sample_time);
         let sampled = Self {
             a,
@@ -52,7 +52,7 @@ impl LinearPlant {
     }
 
     /// `A` and `B` of the system sampled every `sample_time` with its inputs held.
-    pub fn discrete(&self, sample_time: f64) -> (DMatrix<f64>, DMatrix<f64>) {
+    pub(crate) fn discrete(&self, sample_time: f64) -> (DMatrix<f64>, DMatrix<f64>) {
         let (n, m) = (self.a.nrows(), self.b.ncols());
         let mut both = DMatrix::zeros(n + m, n + m);
         both.view_mut((0, 0), (n, n))
@@ -68,14 +68,14 @@ impl LinearPlant {
 }
 
 /// Linearises a plant at many points.
-pub struct Lineariser {
+pub(crate) struct Lineariser {
     tape: Tape,
     frame: Frame<LANES>,
 }
 
 impl Lineariser {
     /// About a state, inputs and a time; what is delayed has the value that it has now.
-    pub fn at(&mut self, state: &[f64], inputs: &[f64], time: f64) -> LinearPlant {
+    pub(crate) fn at(&mut self, state: &[f64], inputs: &[f64], time: f64) -> LinearPlant {
         let Self { tape, frame } = self;
         let (n, m, l) = (tape.states.len(), tape.inputs.len(), tape.outputs.len());
         let mut whole = DMatrix::zeros(n + l, n + m);
@@ -125,7 +125,7 @@ impl Lineariser {
 
 impl Plant {
     /// Made ready to be linearised with the parameters of `point`.
-    pub fn lineariser(&self, point: &Point) -> Lineariser {
+    pub(crate) fn lineariser(&self, point: &Point) -> Lineariser {
         let tape = Tape::with_active_inputs(&self.spec);
         let mut frame: Frame<LANES> = tape.frame();
         for (&slot, &value) in tape.parameters.iter().zip(&point.parameters) {

@@ -19,7 +19,7 @@ mod tape;
 #[cfg(test)]
 mod tests;
 
-pub use linearise::{LinearPlant, Lineariser};
+pub use linearise::LinearPlant;
 pub use plant::{
     Direction, Excitation, Hold, Observer, Plan, Plant, Point, SimulationError, Trajectory,
 };

@@ -283,11 +283,6 @@ impl Plant {
         self
     }
 
-    /// Number of instructions of an evaluation.
-    pub fn instructions(&self) -> usize {
-        self.tape.len()
-    }
-
     /// Initial states at `point`.
     pub fn start(&self, point: &Point) -> Vec<f64> {
         let mut frame = self.tape.frame::<0>();

@@ -30,9 +30,9 @@ const STAGE_ACCURACY: f64 = 0.02;
 /// To what the stages of an implicit step are solved.
 pub(super) struct Accuracy<'a> {
     /// Error of each state.
-    pub absolute: &'a [f64],
+    pub(super) absolute: &'a [f64],
     /// The same as a part of the move of the state in the stage, where that is more.
-    pub relative: f64,
+    pub(super) relative: f64,
 }
 
 /// Room for the stages of a step.
@@ -44,7 +44,7 @@ pub(super) struct Stages<const M: usize> {
 }
 
 impl<const M: usize> Stages<M> {
-    pub fn new(states: usize) -> Self {
+    pub(crate) fn new(states: usize) -> Self {
         let room = || vec![Dual::constant(0.0); states];
         Self {
             slopes: std::array::from_fn(|_| room()),
@@ -55,14 +55,14 @@ impl<const M: usize> Stages<M> {
     }
 
     /// Derivatives at the last stage of the explicit method: at the end of the step, but for an error of order 3.
-    pub fn last_explicit(&self) -> &[Dual<M>] {
+    pub(crate) fn last_explicit(&self) -> &[Dual<M>] {
         &self.slopes[2]
     }
 
     /// Length of the explicit step times the fastest rate that its stages show: `2 |k3 - k2| / |k2 - k1|`, each state in units
     /// of `scale`; NaN where nothing moves. Above 2.8 the method is unstable, even where the step is at rest and shows no error:
     /// its slopes would grow.
-    pub fn stiffness(&self, first: &[Dual<M>], scale: &[f64]) -> f64 {
+    pub(crate) fn stiffness(&self, first: &[Dual<M>], scale: &[f64]) -> f64 {
         let [k2, k3, ..] = &self.slopes;
         let (mut change, mut base) = (0.0, 0.0);
         for (i, scale) in scale.iter().enumerate() {
@@ -74,7 +74,7 @@ impl<const M: usize> Stages<M> {
 
     /// Difference of the implicit step and the embedded one of order 3, smoothed by the matrix of the last stage, which keeps
     /// stiff parts from counting that the step damps (Hairer and Wanner, equation IV.8.20).
-    pub fn embedded_error(&self, length: f64, error: &mut [f64]) {
+    pub(crate) fn embedded_error(&self, length: f64, error: &mut [f64]) {
         for (i, e) in error.iter_mut().enumerate() {
             let each = self.slopes.iter().zip(DIFFERENCE);
             *e = length * each.map(|(k, d)| d * k[i].value).sum::<f64>();
@@ -83,7 +83,7 @@ impl<const M: usize> Stages<M> {
     }
 
     /// The classical method; `first` is the derivative at the start.
-    pub fn explicit(
+    pub(crate) fn explicit(
         &mut self,
         field: &mut Field<M>,
         time: &Dual<M>,
@@ -129,7 +129,7 @@ impl<const M: usize> Stages<M> {
         reason = "a state is an element of several lists"
     )]
     /// The implicit method. False when Newton's iteration does not converge to `accuracy`.
-    pub fn implicit(
+    pub(crate) fn implicit(
         &mut self,
         field: &mut Field<M>,
         time: &Dual<M>,

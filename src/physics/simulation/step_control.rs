@@ -125,7 +125,7 @@ enum Attempt {
 }
 
 impl<'p> StepControl<'p> {
-    pub fn new(
+    pub(crate) fn new(
         plant: &'p Plant,
         integrator: &Integrator<0>,
         rough: bool,
@@ -165,7 +165,7 @@ impl<'p> StepControl<'p> {
     }
 
     /// The steps, with the ramps that they resolve; after a rough run those for the arguments seen.
-    pub fn plan(self, tape: &Tape, used: &[f64]) -> Plan {
+    pub(crate) fn plan(self, tape: &Tape, used: &[f64]) -> Plan {
         let found = |(largest, s): (&f64, &SwitchSlots)| match (s.moves, s.of_states) {
             (false, _) => 0.0,
             (true, true) => RAMP * largest,
@@ -183,7 +183,7 @@ impl<'p> StepControl<'p> {
     }
 
     /// From a sample to the next.
-    pub fn advance(
+    pub(crate) fn advance(
         &mut self,
         integrator: &mut Integrator<0>,
         k: usize,

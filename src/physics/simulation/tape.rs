@@ -38,12 +38,12 @@ pub(super) enum Operation {
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Instruction {
-    pub operation: Operation,
-    pub a: u32,
-    pub b: u32,
-    pub c: u32,
+    pub(super) operation: Operation,
+    pub(super) a: u32,
+    pub(super) b: u32,
+    pub(super) c: u32,
     /// Whether each operand, and so the result, can have a derivative.
-    pub active: [bool; 3],
+    pub(super) active: [bool; 3],
 }
 
 /// What a slot depends on.
@@ -58,13 +58,13 @@ enum Level {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct DelaySlots {
     /// What is delayed.
-    pub value: usize,
+    pub(super) value: usize,
     /// By how long.
-    pub time: usize,
+    pub(super) time: usize,
     /// Where the delayed value is put.
-    pub result: usize,
+    pub(super) result: usize,
     /// True when what is delayed depends on inputs and parameters only.
-    pub of_inputs: bool,
+    pub(super) of_inputs: bool,
 }
 
 /// Equations as a flat program.
@@ -77,46 +77,46 @@ pub(super) struct Tape {
     bounds: [usize; 2],
     leaves: usize,
     literals: Vec<(u32, f64)>,
-    pub time: usize,
-    pub states: Vec<usize>,
-    pub inputs: Vec<usize>,
-    pub parameters: Vec<usize>,
+    pub(super) time: usize,
+    pub(super) states: Vec<usize>,
+    pub(super) inputs: Vec<usize>,
+    pub(super) parameters: Vec<usize>,
     /// Slots of derivatives, outputs and start values, in the order of the states, outputs and states.
-    pub derivatives: Vec<usize>,
-    pub outputs: Vec<usize>,
-    pub starts: Vec<usize>,
+    pub(super) derivatives: Vec<usize>,
+    pub(super) outputs: Vec<usize>,
+    pub(super) starts: Vec<usize>,
     /// Slots of the values that the text gives to the parameters.
-    pub nominal: Vec<usize>,
-    pub delays: Vec<DelaySlots>,
+    pub(super) nominal: Vec<usize>,
+    pub(super) delays: Vec<DelaySlots>,
     /// Slot of every variable.
-    pub variables: Vec<usize>,
+    pub(super) variables: Vec<usize>,
     /// Operand slots of each switch whose argument depends on states or time, and whether it depends on states.
-    pub switches: Vec<SwitchSlots>,
+    pub(super) switches: Vec<SwitchSlots>,
 }
 
 /// A discontinuity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SwitchSlots {
-    pub a: usize,
+    pub(super) a: usize,
     /// None for `sign`.
-    pub b: Option<usize>,
+    pub(super) b: Option<usize>,
     /// False when it depends on parameters, inputs or time only.
-    pub of_states: bool,
+    pub(super) of_states: bool,
     /// True when it changes within a sample.
-    pub moves: bool,
+    pub(super) moves: bool,
 }
 
 /// Values of all slots with `M` derivatives each.
 #[derive(Debug, Clone)]
 pub(super) struct Frame<const M: usize> {
-    pub slot: Vec<Dual<M>>,
+    pub(super) slot: Vec<Dual<M>>,
     /// Half width of the ramp of each switch; 0 is a jump.
-    pub width: Vec<f64>,
+    pub(super) width: Vec<f64>,
 }
 
 impl<const M: usize> Frame<M> {
     /// Argument of a switch.
-    pub fn switch(&self, s: &SwitchSlots) -> f64 {
+    pub(crate) fn switch(&self, s: &SwitchSlots) -> f64 {
         self.slot[s.a].value - s.b.map_or(0.0, |b| self.slot[b].value)
     }
 }
@@ -292,12 +292,12 @@ impl Builder<'_> {
 
 impl Tape {
     /// Compiles the equations of `spec`, in their order.
-    pub fn new(spec: &ModelSpec) -> Self {
+    pub(crate) fn new(spec: &ModelSpec) -> Self {
         Self::compile(spec, false)
     }
 
     /// The same with slopes by the inputs too.
-    pub fn with_active_inputs(spec: &ModelSpec) -> Self {
+    pub(crate) fn with_active_inputs(spec: &ModelSpec) -> Self {
         Self::compile(spec, true)
     }
 
@@ -385,7 +385,7 @@ impl Tape {
     }
 
     /// A frame with literals set and no derivative.
-    pub fn frame<const M: usize>(&self) -> Frame<M> {
+    pub(crate) fn frame<const M: usize>(&self) -> Frame<M> {
         let slots = self.leaves + self.instructions.len();
         let mut frame = Frame {
             slot: vec![Dual::constant(0.0); slots],
@@ -398,22 +398,22 @@ impl Tape {
     }
 
     /// What depends on parameters only.
-    pub fn run_parameters<const M: usize>(&self, frame: &mut Frame<M>) {
+    pub(crate) fn run_parameters<const M: usize>(&self, frame: &mut Frame<M>) {
         self.run(self.part(Level::Parameters), frame);
     }
 
     /// What depends on inputs and parameters only.
-    pub fn run_inputs<const M: usize>(&self, frame: &mut Frame<M>) {
+    pub(crate) fn run_inputs<const M: usize>(&self, frame: &mut Frame<M>) {
         self.run(self.part(Level::Inputs), frame);
     }
 
     /// All else.
-    pub fn run_states<const M: usize>(&self, frame: &mut Frame<M>) {
+    pub(crate) fn run_states<const M: usize>(&self, frame: &mut Frame<M>) {
         self.run(self.part(Level::States), frame);
     }
 
     /// The first expression that is not finite although its operands are: where a calculation goes wrong.
-    pub fn culprit<const M: usize>(&self, frame: &Frame<M>) -> Option<ExpressionId> {
+    pub(crate) fn culprit<const M: usize>(&self, frame: &Frame<M>) -> Option<ExpressionId> {
         self.instructions.iter().enumerate().find_map(|(i, x)| {
             let slot = self.leaves + i;
             let operands = match x.operation {
@@ -428,11 +428,6 @@ impl Tape {
                 .then_some(self.sources[slot])
                 .flatten()
         })
-    }
-
-    /// Number of instructions.
-    pub fn len(&self) -> usize {
-        self.instructions.len()
     }
 
     fn run<const M: usize>(&self, range: std::ops::Range<usize>, frame: &mut Frame<M>) {

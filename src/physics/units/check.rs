@@ -60,7 +60,7 @@ pub fn check_units(spec: &ModelSpec) -> Result<(), SpecError> {
 }
 
 /// All conflicts that [`check_units`] looks for, in the order of the text. What is made of parts in conflict is not compared.
-pub fn unit_conflicts(spec: &ModelSpec) -> Vec<SpecError> {
+pub(crate) fn unit_conflicts(spec: &ModelSpec) -> Vec<SpecError> {
     let mut checker = Checker {
         spec,
         words: Words::new(spec),

@@ -23,6 +23,7 @@ pub(in crate::report) mod plant;
 mod plot;
 mod plotly;
 mod provenance;
+#[cfg(feature = "cli")]
 pub(in crate::report) mod reproduction;
 mod thin;
 mod typeset_number;

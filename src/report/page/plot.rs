@@ -205,6 +205,7 @@ impl Axis {
         }
     }
 
+    #[cfg(feature = "cli")]
     /// The same with names in the place of numbers.
     pub(in crate::report) fn named(self, names: Vec<String>) -> Self {
         Self { names, ..self }
@@ -343,6 +344,7 @@ impl Series {
         self
     }
 
+    #[cfg(feature = "cli")]
     /// The same with words in the picture, at each point.
     pub(in crate::report) fn labelled(mut self, labels: Vec<String>) -> Self {
         if labels.iter().any(|label| !label.is_empty()) {

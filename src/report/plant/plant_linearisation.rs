@@ -205,7 +205,7 @@ pub fn frequency_grid(
 }
 
 /// `count` frequencies with equal ratios.
-pub fn logarithmic(low: f64, high: f64, count: usize) -> Vec<f64> {
+pub(crate) fn logarithmic(low: f64, high: f64, count: usize) -> Vec<f64> {
     let ratio = (high / low).ln() / (count.max(2) - 1) as f64;
     (0..count).map(|k| low * (ratio * k as f64).exp()).collect()
 }

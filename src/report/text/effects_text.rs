@@ -14,16 +14,16 @@ use crate::physics::nearest;
     .nearest.as_ref().map(|n| format!(", did you mean {n}?")).unwrap_or_default()
 )]
 #[allow(missing_docs, reason = "the message explains the fields")]
-pub struct UnknownId {
-    pub id: String,
-    pub nearest: Option<String>,
+pub(crate) struct UnknownId {
+    pub(crate) id: String,
+    pub(crate) nearest: Option<String>,
 }
 
 /// All effects, or one of them in full.
 ///
 /// # Errors
 /// When there is no effect of this id.
-pub fn effects_text(id: Option<&str>) -> Result<String, UnknownId> {
+pub(crate) fn effects_text(id: Option<&str>) -> Result<String, UnknownId> {
     let Some(id) = id else {
         return Ok(list());
     };

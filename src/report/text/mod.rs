@@ -1,31 +1,42 @@
 //! Tables for people: nothing wider than a hundred columns.
 
+#[cfg(feature = "cli")]
 mod effects_text;
 mod explanation_text;
 mod model;
 mod number;
 mod plant;
+#[cfg(feature = "cli")]
 mod reproduction_text;
 mod table;
 
-pub use effects_text::{UnknownId, effects_text};
+#[cfg(feature = "cli")]
+pub(crate) use effects_text::effects_text;
 pub use explanation_text::explanation_text;
-pub use model::{ModelText, comparison, model_text, show_text, validation_text, verdict};
+pub(crate) use model::comparison;
+pub use model::{ModelText, model_text, show_text, validation_text, verdict};
+#[cfg(feature = "report")]
 pub(crate) use model::{
     doubtful, findings, fit_table, gain_table, linearity_tested, method, order_table, pole_table,
     test_tables, too_short,
 };
+#[cfg(feature = "report")]
 pub(crate) use number::percent;
+#[cfg(feature = "cli")]
+pub(crate) use plant::linearisation_text;
+#[cfg(feature = "report")]
 pub(crate) use plant::{
     initial_state_table, leaves_something_out, parameter_table, residual_test_table,
     verdict as plant_verdict,
 };
-pub use plant::{linearisation_text, plant_estimate_text, plant_text, plant_validation_text};
-pub use reproduction_text::reproduction_text;
+pub use plant::{plant_estimate_text, plant_text, plant_validation_text};
+#[cfg(feature = "cli")]
+pub(crate) use reproduction_text::reproduction_text;
+#[cfg(feature = "report")]
 pub(crate) use table::Table;
 
 /// Widest line.
-pub const WIDTH: usize = 100;
+pub(crate) const WIDTH: usize = 100;
 
 /// How text is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,7 +10,7 @@ const WIDTHS: [usize; 4] = [20, 22, 35, 14];
 const GAP: &str = "   ";
 
 /// The comparison, a row a statement of the paper.
-pub fn reproduction_text(reproduction: &Reproduction) -> String {
+pub(crate) fn reproduction_text(reproduction: &Reproduction) -> String {
     let mut text = String::new();
     let heading = format!("{}: {}", reproduction.experiment, reproduction.title);
     text.push_str(&wrapped("", &heading));

@@ -10,7 +10,7 @@ use crate::systems::chiuso_picci_two;
 
 /// Example 2 of Chiuso & Picci.
 #[derive(Debug, Clone, Copy)]
-pub struct ChiusoPicciTwo;
+pub(crate) struct ChiusoPicciTwo;
 
 const EXAMPLE: Example = Example {
     plant: chiuso_picci_two,

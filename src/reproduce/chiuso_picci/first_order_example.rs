@@ -10,7 +10,7 @@ use crate::systems::chiuso_picci_one;
 
 /// Example 1 of Chiuso & Picci.
 #[derive(Debug, Clone, Copy)]
-pub struct ChiusoPicciOne;
+pub(crate) struct ChiusoPicciOne;
 
 const EXAMPLE: Example = Example {
     plant: chiuso_picci_one,

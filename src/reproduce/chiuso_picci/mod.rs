@@ -16,8 +16,8 @@ mod first_order_example;
 mod variance;
 mod variance_study;
 
-pub use fifth_order_example::ChiusoPicciTwo;
-pub use first_order_example::ChiusoPicciOne;
+pub(crate) use fifth_order_example::ChiusoPicciTwo;
+pub(crate) use first_order_example::ChiusoPicciOne;
 
 /// The paper.
 const PAPER: &str =

@@ -10,7 +10,7 @@ use crate::systems::{KnudsenExample, knudsen_armax, knudsen_bj, knudsen_vo};
 
 /// Section 6 of Knudsen for one of its systems.
 #[derive(Debug, Clone, Copy)]
-pub struct KnudsenExperiment {
+pub(crate) struct KnudsenExperiment {
     name: &'static str,
     title: &'static str,
     figure: &'static str,
@@ -43,7 +43,7 @@ const EXPERIMENTS: [KnudsenExperiment; 3] = [
 ];
 
 /// The three experiments.
-pub fn knudsen_experiments() -> &'static [KnudsenExperiment; 3] {
+pub(crate) fn knudsen_experiments() -> &'static [KnudsenExperiment; 3] {
     &EXPERIMENTS
 }
 

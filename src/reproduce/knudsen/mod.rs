@@ -13,7 +13,7 @@ mod experiment;
 mod knudsen_statements;
 mod methods;
 
-pub use experiment::{KnudsenExperiment, knudsen_experiments};
+pub(crate) use experiment::knudsen_experiments;
 
 /// The paper.
 const PAPER: &str =

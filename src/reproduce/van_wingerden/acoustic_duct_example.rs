@@ -16,7 +16,7 @@ use crate::systems::{TestSystem, acoustic_duct};
 
 /// Example II of van Wingerden.
 #[derive(Debug, Clone, Copy)]
-pub struct VanWingerdenTwo;
+pub(crate) struct VanWingerdenTwo;
 
 const SETTING: Setting = Setting {
     samples: 2000,

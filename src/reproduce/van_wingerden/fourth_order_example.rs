@@ -16,7 +16,7 @@ use crate::systems::{TestSystem, pbsid_toolbox, van_wingerden_one};
 
 /// Example I of van Wingerden.
 #[derive(Debug, Clone, Copy)]
-pub struct VanWingerdenOne;
+pub(crate) struct VanWingerdenOne;
 
 const SETTING: Setting = Setting {
     samples: 2000,

@@ -15,8 +15,8 @@ mod fourth_order_example;
 mod measure;
 mod sign;
 
-pub use acoustic_duct_example::VanWingerdenTwo;
-pub use fourth_order_example::VanWingerdenOne;
+pub(crate) use acoustic_duct_example::VanWingerdenTwo;
+pub(crate) use fourth_order_example::VanWingerdenOne;
 
 /// The paper.
 const PAPER: &str = "J.W. van Wingerden, The asymptotic variance of the PBSIDopt algorithm";

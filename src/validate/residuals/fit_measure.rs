@@ -108,7 +108,7 @@ impl FitSums {
 ///
 /// # Errors
 /// [`ValidateError::ConstantOutput`] when an output does not move.
-pub fn fit_measure(
+pub(crate) fn fit_measure(
     output_names: &[String],
     records: &[Vec<(&[f64], &[f64])>],
 ) -> Result<FitMeasure, ValidateError> {
@@ -135,7 +135,7 @@ const EXACT: f64 = 1.5e-8;
 
 impl FitMeasure {
     /// Whether what is left is rounding.
-    pub fn exact(&self) -> bool {
+    pub(crate) fn exact(&self) -> bool {
         self.fit_percent > 100.0 * (1.0 - EXACT)
     }
 }

@@ -12,7 +12,7 @@ mod own_past;
 mod partial;
 mod residual_pass;
 
-pub use fit_measure::fit_measure;
+pub(crate) use fit_measure::fit_measure;
 pub(crate) use own_past::{longest, order};
 pub(crate) use partial::Partial;
 pub(crate) use residual_pass::{ROUNDING, Residuals, Start, cut, residuals, start_up};

@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, dmatrix};
 use rayon::prelude::*;
 
 use crate::covariance::ParameterCovariance;
-use crate::identify::{Fit, MemoryRecords, Options, Order, fit};
+use crate::identify::fit_recordings::fit;
+use crate::identify::{Fit, MemoryRecords, Options, Order};
 use crate::log::Log;
 use crate::model::StateSpace;
 use crate::systems::{TestSystem, servo};

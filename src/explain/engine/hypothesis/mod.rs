@@ -37,11 +37,11 @@ enum Change {
 /// A parameter that a hypothesis brings along.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct NewNumber {
-    pub name: String,
-    pub min: f64,
-    pub max: f64,
-    pub start: Option<f64>,
-    pub unit: Option<String>,
+    pub(crate) name: String,
+    pub(crate) min: f64,
+    pub(crate) max: f64,
+    pub(crate) start: Option<f64>,
+    pub(crate) unit: Option<String>,
 }
 
 /// A term that may be missing in a plant, as a user states it.

@@ -58,7 +58,7 @@ fn uses(spec: &ModelSpec, root: ExpressionId, v: VariableId) -> bool {
 
 impl Target {
     /// What a left-hand side means.
-    pub fn find(left: &str, spec: &ModelSpec) -> Result<Self, Kind> {
+    pub(crate) fn find(left: &str, spec: &ModelSpec) -> Result<Self, Kind> {
         let wanted = dense(left);
         let written = |e: &&Equation| dense(left_text(spec, e)) == wanted;
         if let Some(equation) = spec.equations.iter().find(written) {

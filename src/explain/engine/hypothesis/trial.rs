@@ -44,23 +44,23 @@ static AT_PARAMETER: Term = term(Port::Parameter);
 
 /// A plant, its fit, and the fits whose noise models a search starts from.
 pub(crate) struct Ground<'a> {
-    pub plant: &'a Plant,
-    pub study: &'a Study<'a>,
-    pub fit: &'a Fit,
-    pub origins: Vec<&'a Fit>,
-    pub recordings: &'a [PlantRecording],
-    pub options: &'a EstimateOptions,
+    pub(crate) plant: &'a Plant,
+    pub(crate) study: &'a Study<'a>,
+    pub(crate) fit: &'a Fit,
+    pub(crate) origins: Vec<&'a Fit>,
+    pub(crate) recordings: &'a [PlantRecording],
+    pub(crate) options: &'a EstimateOptions,
 }
 
 /// What the recordings say about a hypothesis.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Trial {
     /// Added to the plant of the text; none where that cannot be simulated.
-    pub alone: Option<Fitted>,
+    pub(crate) alone: Option<Fitted>,
     /// Its gain beside the effects that were named.
-    pub beside: Option<f64>,
+    pub(crate) beside: Option<f64>,
     /// The step in which it was accepted.
-    pub accepted: Option<usize>,
+    pub(crate) accepted: Option<usize>,
 }
 
 /// Fits the hypotheses that are still open.

@@ -21,6 +21,6 @@ const TEMPLATES: [(&str, &str); 1] = [("reproduction", include_str!("reproductio
 ///
 /// # Errors
 /// When the template cannot be filled, which no reproduction should bring about.
-pub fn reproduction_page(reproduction: &Reproduction) -> Result<String, PageError> {
+pub(crate) fn reproduction_page(reproduction: &Reproduction) -> Result<String, PageError> {
     render(&TEMPLATES, &reproduction_view::view(reproduction))
 }

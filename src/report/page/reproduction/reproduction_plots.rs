@@ -86,7 +86,6 @@ fn series(curve: &Curve, at: &[f64], lowest: f64) -> Series {
         Role::First => "first",
         Role::Second => "second",
         Role::Third => "third",
-        Role::Fourth => "fourth",
     };
     let lines = curve.lines.iter().map(|line| {
         at.iter()

@@ -20,7 +20,7 @@ pub(crate) fn order_table(summary: &Summary) -> Table {
 }
 
 /// The comparison of the orders that were asked for.
-pub fn comparison(summary: &Summary, asked: &[usize]) -> String {
+pub(crate) fn comparison(summary: &Summary, asked: &[usize]) -> String {
     let among = |e: &&OrderEvidence| asked.contains(&e.order);
     let evidence = summary.diagnostics.orders.iter();
     titled("Orders asked for", &table(summary, evidence.filter(among)))

@@ -26,6 +26,7 @@ pub(crate) fn pole_table(roots: &[Root], most: usize, style: Style) -> Table {
     pole_table_of(roots, most, style, kind)
 }
 
+#[cfg(feature = "cli")]
 /// Poles in the `s` plane.
 pub(crate) fn continuous_pole_table(roots: &[Root], style: Style) -> Table {
     pole_table_of(roots, usize::MAX, style, |root| {

@@ -33,14 +33,14 @@ pub fn validation_text(tests: &Validation) -> String {
 
 /// What a verdict says.
 pub(crate) struct Headline<'a> {
-    pub what: &'static str,
-    pub relation: Relation,
-    pub samples: usize,
-    pub level: f64,
-    pub rejected: bool,
-    pub too_short: Option<&'a TooShort>,
+    pub(crate) what: &'static str,
+    pub(crate) relation: Relation,
+    pub(crate) samples: usize,
+    pub(crate) level: f64,
+    pub(crate) rejected: bool,
+    pub(crate) too_short: Option<&'a TooShort>,
     /// What an acceptance rests on.
-    pub accepted: &'a str,
+    pub(crate) accepted: &'a str,
 }
 
 /// The first sentence.

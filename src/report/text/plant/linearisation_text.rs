@@ -12,7 +12,7 @@ use crate::report::text::{Style, wrapped};
 use crate::report::{IdentifiedDocument, LinearisationDocument, OperatingValue};
 
 /// Operating point, poles, static gains and frequency responses, and beside them the linear model of the same recording.
-pub fn linearisation_text(
+pub(crate) fn linearisation_text(
     document: &LinearisationDocument,
     plant: &Plant,
     every_frequency: bool,

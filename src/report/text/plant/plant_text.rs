@@ -1,6 +1,6 @@
 //! A plant in equations, for people: what was read, and what was estimated.
 
-use super::plant_validation_text::{initial_state_text, residual_test_table, tests_fail};
+use super::plant_validation_text::{initial_state_text, residual_test_table};
 use crate::physics::{ModelSpec, Plant, Unknown, Variable, VariableKind, unit_conflicts};
 use crate::report::PlantDocument;
 use crate::report::plant::FitDocument;
@@ -364,9 +364,11 @@ pub(crate) fn verdict(document: &PlantDocument, title: &str) -> String {
     )
 }
 
+#[cfg(feature = "report")]
 /// Whether the equations leave something out: a test of the residuals fails, or a linear model follows clearly better.
 pub(crate) fn leaves_something_out(document: &PlantDocument) -> bool {
-    tests_fail(&document.residual_tests) || better_linear_model(document).is_some()
+    super::plant_validation_text::tests_fail(&document.residual_tests)
+        || better_linear_model(document).is_some()
 }
 
 /// How many times the free run's error is larger than the one-step error.

@@ -71,9 +71,11 @@ pub(crate) fn initial_state_table(of: &[InitialStateDocument], style: Style) -> 
     table
 }
 
+#[cfg(feature = "report")]
 /// Level at which the tests together are said to fail.
 const LEVEL: f64 = 0.01;
 
+#[cfg(feature = "report")]
 /// Whether one of the tests fails.
 pub(crate) fn tests_fail(tests: &[TestDocument]) -> bool {
     let level = LEVEL / tests.len().max(1) as f64;
