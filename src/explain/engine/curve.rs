@@ -102,7 +102,7 @@ pub(super) fn curves(
         let argument = &arguments[at];
         let hook = hooked.places.iter().position(|p| *p == place)?;
         let knots = knots(argument);
-        let columns: Vec<Vec<f64>> = (0..knots.len())
+        let (columns, products): (Vec<Vec<f64>>, Vec<DVector<f64>>) = (0..knots.len())
             .map(|i| {
                 let signal: Vec<Vec<f64>> = argument
                     .values
@@ -111,10 +111,10 @@ pub(super) fn curves(
                     .collect();
                 let held = argument.held;
                 let mut column = whiten(&path.propagate(hooked.columns[hook], &signal, held, gain));
-                projection.off(&mut column);
-                column
+                let products = projection.off(&mut column);
+                (column, products)
             })
-            .collect();
+            .unzip();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let m = columns.len();
         let mut normal = DMatrix::from_fn(m, m, |i, j| dot(&columns[i], &columns[j]));
@@ -126,6 +126,10 @@ pub(super) fn curves(
         (statistic.is_finite() && m > 2).then(|| {
             let mut lead = Lead::untested(&CURVE, place);
             (lead.argument, lead.statistic) = (Some(at), statistic);
+            let each = products.into_iter().zip(&values).map(|(p, v)| p * *v);
+            lead.shift = each
+                .reduce(|a, b| a + b)
+                .map_or_else(Vec::new, |sum| projection.shift(&sum));
             let values = values.iter().copied().collect();
             lead.curve = Some(Curve { knots, values });
             lead

@@ -8,7 +8,7 @@ use super::candidate::candidate;
 use super::edit::Place;
 use super::fitted::{Fitted, searched, with_more};
 use super::path::{hooked, path};
-use super::search::{MOST_STEPS, ROUNDS, THOROUGH};
+use super::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Plant};
 

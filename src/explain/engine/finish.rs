@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::fitted::{Fitted, searched, with_more};
 use super::names::{SPECIFIC, rank};
-use super::search::{FINISHED, MOST_STEPS, ROUNDS, THOROUGH};
+use super::thresholds::{FINISHED, MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 
 /// Names that gain this part of the best are finished too.

@@ -119,7 +119,7 @@ pub(crate) struct Term {
     pub(crate) units: &'static [&'static str],
 }
 
-const fn shape(symbol: &'static str, starts: Starts, positive: bool) -> Shape {
+pub(super) const fn shape(symbol: &'static str, starts: Starts, positive: bool) -> Shape {
     Shape {
         symbol,
         starts,
@@ -127,7 +127,7 @@ const fn shape(symbol: &'static str, starts: Starts, positive: bool) -> Shape {
     }
 }
 
-const fn curve(
+pub(super) const fn curve(
     id: &'static str,
     port: Port,
     needs: Needs,

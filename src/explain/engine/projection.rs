@@ -87,6 +87,16 @@ impl Projection {
         DVector::from_vec(products.collect())
     }
 
+    /// What the regression adds to each number of the fit beside a term whose column had these products.
+    pub(super) fn shift(&self, products: &DVector<f64>) -> Vec<f64> {
+        let of_inside = &self.numbers * products;
+        let mut shift = vec![0.0; self.count];
+        for (&i, s) in self.inside.iter().zip(&of_inside) {
+            shift[i] = -s;
+        }
+        shift
+    }
+
     /// Tests a whitened column; none where parameters can do the same.
     pub(crate) fn test(&self, mut column: Vec<f64>, free: bool) -> Option<Tested> {
         let square = |c: &[f64]| c.iter().map(|v| v * v).sum::<f64>();
@@ -111,15 +121,10 @@ impl Projection {
         } else {
             (along.max(0.0).powi(2) / after, 1.0)
         };
-        let of_inside = &self.numbers * products * -strength;
-        let mut shift = vec![0.0; self.count];
-        for (&i, s) in self.inside.iter().zip(&of_inside) {
-            shift[i] = *s;
-        }
         Some(Tested {
             statistic,
             strength,
-            shift,
+            shift: self.shift(&(products * strength)),
             signature,
         })
     }

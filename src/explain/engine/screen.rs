@@ -104,6 +104,8 @@ pub(crate) struct Screen {
     pub(crate) curves: Vec<Lead>,
     /// Number of tests.
     pub(crate) tests: usize,
+    /// Whether the states were not those of the fit: it is far from what its terms would make of it.
+    pub(crate) strays: bool,
     pub(crate) arguments: Vec<Argument>,
 }
 
@@ -218,6 +220,7 @@ pub(crate) fn screen(
         leads,
         curves,
         tests: count,
+        strays: !std::ptr::eq(fit, along),
         arguments,
     })
 }

@@ -7,9 +7,10 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::holdout::{Estimator, HeldOut, all_free, as_given, free_run_error, held_out};
+use super::holdout::{EXPLAINED, Estimator, HeldOut, all_free, as_given, free_run_error, held_out};
 use super::scope::Scope;
-use super::search::{Found, MOST_STEPS, Objective, SECOND, chance, search};
+use super::search::{Found, Objective, search};
+use super::thresholds::{MOST_STEPS, SECOND, chance};
 use crate::physics::estimate::{EstimateError, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, Plant};
 
@@ -75,9 +76,14 @@ pub(crate) fn select(
             rivals.extend(self::rivals(&found, 1, recordings, hold));
             searches.push(found);
         }
+        // What the likelihood proves with as many values as are independent, and explains the free run too, gives way only to
+        // what explains it as clearly better.
+        let kept = best(&rivals, |r| (r.search, r.accepted) == chosen)
+            .filter(|r| r.accepted > 0 && holds && explains(r, best(&rivals, |r| r.accepted == 0)));
         let improving: Vec<&Rival> = rivals
             .iter()
             .filter(|r| !worsens(&rivals, r.search, r.accepted))
+            .filter(|r| r.search == 0 || kept.is_none() || explains(r, kept))
             .collect();
         chosen = match winner(&improving) {
             // Without an effect the tests of the likelihood count.
@@ -106,6 +112,11 @@ pub(crate) fn select(
         }
     }
     Ok(found)
+}
+
+/// Whether a free run takes more than half of the mean square off that of another, in blocks left out.
+fn explains(rival: &Rival, other: Option<&Rival>) -> bool {
+    other.is_some_and(|o| rival.held_out.removed(&o.held_out) >= EXPLAINED)
 }
 
 /// Of the fits of one plant the likelihood's, whose standard deviations hold, unless it simulates worse, in blocks left out or

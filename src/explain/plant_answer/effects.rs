@@ -7,7 +7,7 @@ use crate::explain::engine::curve::piece;
 use crate::explain::engine::edit::{Place, user_of};
 use crate::explain::engine::fitted::Fitted;
 use crate::explain::engine::library::Port;
-use crate::explain::engine::search::NEEDED;
+use crate::explain::engine::thresholds::NEEDED;
 use crate::explain::engine::values::filled;
 use crate::explain::explanation::{Alternative, EffectFound, Evidence, Law, Quantity, Verdict};
 use crate::physics::{Excitation, Hold, Plant, VariableId, parse};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{Answer, figure};
 use crate::explain::engine::fitted::{Fitted, TIE, with_more};
 use crate::explain::engine::hypothesis::{Hypothesis, Trial};
-use crate::explain::engine::search::{NEEDED, SURE};
+use crate::explain::engine::thresholds::{NEEDED, SURE};
 use crate::explain::explanation::{
     FitFigure, HypothesisFit, HypothesisFound, HypothesisRival, HypothesisVerdict, Quantity,
 };

@@ -14,8 +14,9 @@ use super::engine::holdout::{EXPLAINED, HeldOut, blocks};
 use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
 use super::engine::library::Port;
 use super::engine::scope::Scope;
-use super::engine::search::{Found, LEFT, SURE, chance};
+use super::engine::search::Found;
 use super::engine::select::{CHANCE, select};
+use super::engine::thresholds::{LEFT, SURE, chance};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
     FitTable, Location, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,

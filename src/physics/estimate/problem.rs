@@ -126,6 +126,13 @@ fn mask(recordings: &[PlantRecording]) -> Mask {
         .collect()
 }
 
+/// What Schwarz's criterion adds for numbers that are estimated from so many values, independent ones and all, with the
+/// correction for few values (A. McQuarrie, *Statistics & Probability Letters* 44, 1999).
+pub(super) fn penalty(numbers: usize, independent: f64, values: usize) -> f64 {
+    let (k, n) = (numbers as f64, values as f64);
+    k * independent.ln() * n / (n - k - 2.0).max(1.0)
+}
+
 impl<'a> Problem<'a> {
     pub(crate) fn new(
         plant: &dyn Simulated,
@@ -416,10 +423,11 @@ impl<'a> Problem<'a> {
             .collect()
     }
 
-    /// Schwarz's criterion.
+    /// Schwarz's criterion (BIC).
     pub(crate) fn criterion(&self, deviance: f64, of_noise: usize, of_gain: usize) -> f64 {
         let numbers = self.nominal().len() + of_noise + of_gain;
-        deviance + numbers as f64 * (self.count() as f64).ln()
+        let count = self.count();
+        deviance + penalty(numbers, count as f64, count)
     }
 
     /// Gain of the observer in the numbers behind the initial states.

@@ -6,7 +6,7 @@ use super::deviance::{Deviance, Slopes};
 use super::free_run::{follows, white_fit};
 use super::observer::{self, unbounded};
 use super::optimise::{Effort, minimise};
-use super::problem::{EstimateError, PlantRecording, Problem};
+use super::problem::{EstimateError, PlantRecording, Problem, penalty};
 use super::{EstimateOptions, Fit, Form, SEARCH, best_fit};
 use crate::noise::{Colours, Mask, Noise, Series, effective_samples};
 use crate::physics::simulation::{Observer, Plant, Point, Trajectory};
@@ -73,7 +73,7 @@ impl<'a> Study<'a> {
         let of_gain = fit.point.len() - self.problem.nominal().len();
         let numbers = self.problem.nominal().len() + fit.noise.len() + of_gain;
         let values = (self.information * self.count() as f64).max(1.0);
-        self.information * fit.deviance + numbers as f64 * values.ln()
+        self.information * fit.deviance + penalty(numbers, values, self.count())
     }
 
     /// The free numbers as the text has them.
@@ -108,23 +108,14 @@ impl<'a> Study<'a> {
         Some(Fit { criterion, ..fit })
     }
 
-    /// A fit with the same parameters whose states are nearer to those of the plant: where a free run strays from the recording,
-    /// an observer that keeps the states near what the outputs show.
-    pub(crate) fn along_recording(&self, fit: &Fit) -> Fit {
+    /// Where a free run strays from the recording, the same parameters with an observer that keeps the states near what the
+    /// outputs show.
+    pub(crate) fn along_recording(&self, free_run: &Fit) -> Option<Fit> {
         let numbers = self.problem.nominal().len();
-        let white = self.gaussian(fit).filter(|w| w.form == Form::FreeRun);
-        let observed = white.as_ref().and_then(|_| {
-            let starts = observer::starts(&self.problem, &fit.point[..numbers]);
-            starts.into_iter().next()
-        });
-        match (white, observed) {
-            (Some(white), Some(observed))
-                if white.deviance - observed.deviance > STRAYS * self.count() as f64 =>
-            {
-                observed
-            }
-            _ => fit.clone(),
-        }
+        let white = self.gaussian(free_run)?;
+        let starts = observer::starts(&self.problem, &free_run.point[..numbers]);
+        let observed = starts.into_iter().next()?;
+        (white.deviance - observed.deviance > STRAYS * self.count() as f64).then_some(observed)
     }
 
     /// The same numbers under Gaussian noise of the size of the residual, where every value counts as much as any other.

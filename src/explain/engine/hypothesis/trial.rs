@@ -9,7 +9,7 @@ use crate::explain::engine::edit::{Edit, Place, literal, sensors};
 use crate::explain::engine::fitted::{Fitted, TIE, with_more};
 use crate::explain::engine::library::{Needs, Port, Term};
 use crate::explain::engine::screen::Lead;
-use crate::explain::engine::search::{GLANCE, NEEDED, ROUNDS, SECOND, SURE, THOROUGH};
+use crate::explain::engine::thresholds::{GLANCE, NEEDED, ROUNDS, SECOND, SURE, THOROUGH};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Plant, VariableKind};
 

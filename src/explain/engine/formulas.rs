@@ -1,0 +1,156 @@
+//! The shortest formula for a curve that nobody listed: each is fitted to the curve, and the nearest in its place.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::argument::Argument;
+use super::candidate::candidate;
+use super::curve::piece;
+use super::fitted::{Fitted, searched, with_more};
+use super::hypothesis::Ground;
+use super::library::{Needs, Port, Starts, Term, curve, shape};
+use super::screen::Lead;
+use super::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
+use super::values::{Instance, evaluate, grid};
+use crate::physics::estimate::Fit;
+
+const WIDTHS: Starts = Starts::Spread(&[0.1, 0.2, 0.5, 1.0, 2.0]);
+const MIDDLES: Starts = Starts::Quantiles(&[0.1, 0.3, 0.5, 0.7, 0.9]);
+const POWERS: Starts = Starts::Values(&[0.5, 1.5, 2.5, 4.0]);
+
+/// Functions of one variable with one or two shapes: powers, growth, decay, saturation, rise and fall.
+const FORMULAS: &[Term] = &[
+    law("sign({z})*abs({z})^{p}", &[shape("p", POWERS, true)]),
+    law("abs({z})^{p}", &[shape("p", POWERS, true)]),
+    law("exp({z}/{s})", &[shape("s", WIDTHS, true)]),
+    law("exp(-{z}/{s})", &[shape("s", WIDTHS, true)]),
+    law("tanh({z}/{s})", &[shape("s", WIDTHS, true)]),
+    law("{z}*exp(-({z}/{s})^2)", &[shape("s", WIDTHS, true)]),
+    law("{z}/(1 + ({z}/{s})^2)", &[shape("s", WIDTHS, true)]),
+    law("1/(1 + ({z}/{s})^2)", &[shape("s", WIDTHS, true)]),
+    law(
+        "exp(-(({z} - {o})/{s})^2)",
+        &[shape("o", MIDDLES, false), shape("s", WIDTHS, true)],
+    ),
+    law(
+        "tanh(({z} - {o})/{s})",
+        &[shape("o", MIDDLES, false), shape("s", WIDTHS, true)],
+    ),
+];
+/// Formulas that are fitted to the recording: those nearest to the curve.
+const FITTED: usize = 3;
+
+const fn law(form: &'static str, shapes: &'static [super::library::Shape]) -> Term {
+    curve("formula", Port::Equation, Needs::Anything, form, shapes)
+}
+
+/// A formula for the curve, with its start.
+struct Near {
+    term: &'static Term,
+    shapes: Vec<f64>,
+    strength: f64,
+    /// What it leaves of the curve's sum of squares about its straight part.
+    left: f64,
+}
+
+/// The formulas near to the curve of a fit, fitted in its place; none where it is no curve.
+pub(super) fn formulas(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Vec<Fitted> {
+    let nearest = nearest(best, arguments, ground).unwrap_or_default();
+    nearest
+        .par_iter()
+        .filter_map(|near| in_its_place(best, near, arguments, ground))
+        .collect()
+}
+
+/// The regression of the curve on each formula, beside a constant and a slope: those may be what parameters do.
+fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec<Near>> {
+    let curve = best.lead.curve.as_ref()?;
+    let at = best.lead.argument?;
+    let argument = &arguments[at];
+    let first = ground.study.parameters();
+    let values = &best.fit.point[first..first + curve.knots.len()];
+    let instances: Vec<Instance> = FORMULAS
+        .iter()
+        .flat_map(|term| {
+            let all = grid(term, Some(argument), ground.recordings, &[]);
+            all.into_iter().map(move |shapes| Instance {
+                term,
+                argument: Some(at),
+                shapes,
+            })
+        })
+        .collect();
+    let columns = evaluate(&instances, arguments, ground.recordings)?;
+    let z: Vec<f64> = argument.values.concat();
+    let wanted = DVector::from_iterator(
+        z.len(),
+        z.iter().map(|&z| {
+            let each = values.iter().enumerate();
+            each.map(|(i, v)| v * piece(&curve.knots, i, z)).sum()
+        }),
+    );
+    let mut found: Vec<Near> = Vec::new();
+    for (instance, column) in instances.into_iter().zip(columns) {
+        let column = column.concat();
+        let basis = DMatrix::from_fn(z.len(), 3, |i, j| [1.0, z[i], column[i]][j]);
+        let Some(normal) = (basis.transpose() * &basis).cholesky() else {
+            continue;
+        };
+        let regression = normal.solve(&(basis.transpose() * &wanted));
+        let left = (&wanted - &basis * &regression).norm_squared();
+        if !left.is_finite() {
+            continue;
+        }
+        let near = Near {
+            term: instance.term,
+            shapes: instance.shapes,
+            strength: regression[2],
+            left,
+        };
+        match found.iter_mut().find(|n| n.term == near.term) {
+            Some(known) if near.left < known.left => *known = near,
+            Some(_) => {}
+            None => found.push(near),
+        }
+    }
+    found.sort_by(|a, b| a.left.total_cmp(&b.left));
+    found.truncate(FITTED);
+    Some(found)
+}
+
+fn in_its_place(
+    best: &Fitted,
+    near: &Near,
+    arguments: &[Argument],
+    ground: &Ground,
+) -> Option<Fitted> {
+    let (study, plant) = (ground.study, ground.plant);
+    let mut lead = Lead::untested(near.term, best.lead.place).at(
+        best.lead.place,
+        best.lead.argument,
+        &near.shapes,
+    );
+    lead.strength = near.strength;
+    let made = candidate(&plant.spec, &lead, arguments, ground.recordings)?;
+    let options = with_more(ground.options, made.values.len());
+    let limited = made.plant.clone().with_most_steps(MOST_STEPS);
+    let inner = study.of(&limited, &options).ok()?;
+    let parameters = study.parameters();
+    let mut point = best.fit.point.clone();
+    point.drain(parameters..parameters + best.candidate.values.len());
+    let without = Fit {
+        point,
+        ..best.fit.clone()
+    };
+    let states = plant.spec.states().len();
+    let start = made.from(&without, parameters, states, study.outputs());
+    let fit = inner.refit(&start, ROUNDS, THOROUGH)?;
+    Some(Fitted {
+        gain: ground.fit.criterion - fit.criterion - searched(&lead, ground.recordings),
+        shapes: fit.point[parameters..][..lead.shapes.len()].to_vec(),
+        lead,
+        candidate: made,
+        fit,
+        ..best.clone()
+    })
+}

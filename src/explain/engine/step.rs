@@ -1,0 +1,338 @@
+//! One step of a search: score tests, fits of what they find, and the order of these.
+
+use rayon::prelude::*;
+
+use super::candidate::{Candidate, candidate};
+use super::edit::Place;
+use super::finish::finished;
+use super::fitted::{Fitted, TIE, order, searched, with_more};
+use super::formulas::formulas;
+use super::hypothesis::{Ground, trials};
+use super::names::{SPECIFIC, named, rank_of};
+use super::scope::Scope;
+use super::screen::{Lead, Screen, screen};
+use super::second_effect::drop_alike;
+use super::thresholds::{
+    AT_A_PLACE, BETTER, COMPARED, FINISHED, FITTED, FORETOLD, GLANCE, GLANCED, GLANCED_ACCURACY,
+    GLANCED_STEPS, IMITATED, LEFT, MOST, MOST_STEPS, NEEDED, OF_A_KIND, THOROUGH, chance,
+};
+use crate::physics::estimate::{EstimateOptions, Fit, Form, PlantRecording, Study};
+use crate::physics::{ModelSpec, Plant};
+
+fn promising(screen: &Screen, spec: &ModelSpec) -> Vec<Lead> {
+    let mut kept: Vec<Lead> = Vec::new();
+    for lead in &screen.leads {
+        let kind = |l: &&Lead| l.term == lead.term;
+        let same =
+            |l: &Lead| l.term == lead.term && l.place == lead.place && l.argument == lead.argument;
+        let place = |l: &&Lead| l.place == lead.place;
+        if kept.iter().any(same)
+            || kept.iter().filter(kind).count() >= OF_A_KIND
+            || kept.iter().filter(place).count() >= AT_A_PLACE
+        {
+            continue;
+        }
+        kept.push(lead.clone());
+        if kept.len() == GLANCED {
+            break;
+        }
+    }
+    // What has a name of its own is not crowded out by curves that imitate it.
+    let strong = screen.leads.first().map_or(0.0, |l| IMITATED * l.statistic);
+    let specific = |l: &&Lead| {
+        let variables = l
+            .argument
+            .map_or(&[][..], |a| &screen.arguments[a].variables);
+        l.statistic > strong && rank_of(spec, l.term, l.place, variables) < SPECIFIC
+    };
+    for lead in screen.leads.iter().filter(specific) {
+        if !kept.iter().any(|l| l.term == lead.term) {
+            kept.push(lead.clone());
+        }
+    }
+    kept.extend(screen.curves.iter().cloned());
+    kept
+}
+
+/// A plant in which something may be missing.
+pub(super) struct Stage<'a> {
+    pub(super) plant: &'a Plant,
+    pub(super) study: &'a Study<'a>,
+    pub(super) fit: &'a Fit,
+    /// The plant before effects were found.
+    pub(super) given: &'a ModelSpec,
+    /// Gain that an effect needs.
+    pub(super) needed: f64,
+    /// Effects that were found, and the first of them.
+    pub(super) accepted: usize,
+    pub(super) first: Option<&'a Fitted>,
+    pub(super) recordings: &'a [PlantRecording],
+    pub(super) options: &'a EstimateOptions,
+    pub(super) scope: &'a Scope,
+    /// Hypotheses that are not yet part of the plant.
+    pub(super) open: &'a [usize],
+}
+
+/// The fit of the plant alone from where a candidate has led, where that is better: what the term seemed to gain was a better
+/// fit of the plant's own parameters.
+pub(super) fn improved(stage: &Stage, fitted: &[Fitted]) -> Option<Fit> {
+    let first = stage.study.parameters();
+    let best = fitted
+        .iter()
+        .filter(|f| f.hypothesis.is_none() && f.gain > NEEDED);
+    best.take(FINISHED)
+        .filter(|f| f.candidate.new_states == 0)
+        .filter_map(|f| {
+            let mut point = f.fit.point.clone();
+            point.drain(first..first + f.candidate.values.len());
+            let from = Fit {
+                point,
+                ..f.fit.clone()
+            };
+            stage.study.refit(&from, 1, THOROUGH)
+        })
+        .filter(|again| again.criterion < stage.fit.criterion - BETTER)
+        .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+}
+
+/// Of fits of one term from several starts keeps the best, which comes first.
+fn drop_repeated(fitted: &mut Vec<Fitted>) {
+    let mut known: Vec<(&str, Place, String)> = Vec::new();
+    fitted.retain(|f| {
+        let this = (f.lead.term.id, f.lead.place, f.argument.clone());
+        let new = f.hypothesis.is_some() || !known.contains(&this);
+        known.push(this);
+        new
+    });
+}
+
+/// Where the fit of a candidate starts: with the other numbers as they were, or as the regression on its term moves them.
+fn started(inner: &Study, made: &Candidate, lead: &Lead, (study, from): (&Study, &Fit)) -> Fit {
+    let states = study.plant().spec.states().len();
+    let (parameters, outputs) = (study.parameters(), study.outputs());
+    let plain = made.from(from, parameters, states, outputs);
+    if lead.shift.is_empty() {
+        return plain;
+    }
+    let moved = Fit {
+        point: study.moved(from, &lead.shift),
+        ..from.clone()
+    };
+    let moved = made.from(&moved, parameters, states, outputs);
+    let deviance = |fit: &Fit| inner.deviance(fit).unwrap_or(f64::INFINITY);
+    if deviance(&moved) < deviance(&plain) {
+        moved
+    } else {
+        plain
+    }
+}
+
+/// Fits the leads of a plant; best first. Also the strongest test, and how many there were.
+pub(super) fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
+    let Stage {
+        plant,
+        study,
+        fit,
+        given,
+        needed,
+        accepted,
+        first,
+        recordings,
+        options,
+        scope,
+        open,
+    } = *stage;
+    let states = plant.spec.states().len();
+    let parameters = study.parameters();
+    let outputs = study.outputs();
+    let mut tried: Vec<(Screen, Fit)> = Vec::new();
+    if let Some(s) = screen(study, fit, fit, given, recordings) {
+        tried.push((s, fit.clone()));
+    }
+    let strongest = tried.first().map_or((0.0, 0), |(s, _)| {
+        let best = s.leads.first().map_or(0.0, |l| l.statistic);
+        (study.information() * best, s.tests)
+    });
+    // Beside an effect that was found, a second one is looked for only where a test says that something is left.
+    let insignificant = chance(strongest.0) * strongest.1 as f64 > LEFT;
+    let nothing_left = accepted > 0 && insignificant || accepted == MOST;
+    if nothing_left {
+        for (screen, _) in &mut tried {
+            screen.leads.clear();
+            screen.curves.clear();
+        }
+    }
+    // A noise model that was fitted where physics is missing absorbs it: the same again under white noise.
+    let mut free_run = options.least_squares.then(|| fit.clone());
+    if !nothing_left && !options.least_squares {
+        free_run = study.least_squares(&fit.point).filter(|w| study.follows(w));
+        if let Some(white) = &free_run
+            && let Some(s) = screen(study, white, white, given, recordings)
+        {
+            tried.push((s, white.clone()));
+        }
+    }
+    // Where a free run strays from the recording, what a term would do depends on where the recording was. That an observer
+    // follows the noise too is of no matter for where fits start, but would be for the test above.
+    if !nothing_left
+        && let Some(white) = free_run
+        && let Some(along) = study.along_recording(&white)
+        && let Some(s) = screen(study, &white, &along, given, recordings)
+    {
+        tried.push((s, white));
+    }
+    // Heavy tails discount what is rare and large, such as the contact with an end stop, and an observer recovers from it: the
+    // same again where every value counts.
+    if !nothing_left
+        && fit.form == Form::Innovation
+        && fit.noise.degrees.is_finite()
+        && let Some(gaussian) = study.gaussian(fit)
+        && let Some(s) = screen(study, &gaussian, &gaussian, given, recordings)
+        && chance(s.leads.first().map_or(0.0, |l| l.statistic)) * s.tests as f64 <= LEFT
+    {
+        tried.push((s, gaussian));
+    }
+    // Where there is no free run to look at, what no test finds is what a candidate does to the observer.
+    if tried.len() == 1 && insignificant && !options.least_squares {
+        tried[0].0.leads.clear();
+        tried[0].0.curves.clear();
+    }
+    for (screen, _) in &mut tried {
+        scope.restrict(&plant.spec, screen);
+        if accepted > 0 {
+            let least = FORETOLD * needed / study.information();
+            screen.leads.retain(|l| l.statistic >= least);
+            screen.curves.retain(|l| l.statistic >= least);
+        }
+        if let Some(first) = first {
+            drop_alike(screen, &plant.spec, (first, named(given, first)));
+        }
+    }
+    let mut glanced: Vec<(f64, Lead, usize, Candidate, Fit)> = tried
+        .iter()
+        .enumerate()
+        .flat_map(|(i, (screen, from))| {
+            promising(screen, &plant.spec)
+                .into_iter()
+                .map(move |lead| (i, screen, from, lead))
+        })
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .filter_map(|(i, screen, from, lead)| {
+            let made = candidate(&plant.spec, &lead, &screen.arguments, recordings)?;
+            let options = with_more(options, made.values.len());
+            let rough = made
+                .plant
+                .clone()
+                .with_accuracy(GLANCED_ACCURACY)
+                .with_most_steps(GLANCED_STEPS);
+            let inner = study.of(&rough, &options).ok()?;
+            let start = match screen.strays {
+                true => started(&inner, &made, &lead, (study, from)),
+                false => made.from(from, parameters, states, outputs),
+            };
+            // What a memory does within a sample, such as a contact, frozen slopes do not see.
+            let fitted = match made.new_states {
+                0 => inner.glance(&start, GLANCE)?,
+                _ => inner.refit(&start, 0, GLANCE)?,
+            };
+            Some((from.deviance - fitted.deviance, lead, i, made, fitted))
+        })
+        .collect();
+    glanced.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut chosen: Vec<(Lead, usize, Candidate, Fit)> = Vec::new();
+    for (which, (screen, _)) in tried.iter().enumerate() {
+        let list: Vec<_> = glanced.iter().filter(|g| g.2 == which).collect();
+        let most = list.first().map_or(0.0, |g| g.0);
+        let close = |g: &&_| {
+            let (gain, lead, ..): &(f64, Lead, usize, Candidate, Fit) = g;
+            let variables = lead
+                .argument
+                .map_or(&[][..], |a| &screen.arguments[a].variables);
+            let specific = rank_of(&plant.spec, lead.term, lead.place, variables) < SPECIFIC;
+            *gain > (1.0 - TIE.1) * most && specific
+        };
+        let best = list.iter().take(FITTED);
+        let others = list.iter().skip(FITTED).copied().filter(close);
+        chosen.extend(
+            best.copied()
+                .chain(others)
+                .map(|g| (g.1.clone(), g.2, g.3.clone(), g.4.clone())),
+        );
+    }
+    let fitted: Vec<Fitted> = chosen
+        .into_par_iter()
+        .filter_map(|(lead, which, made, from)| {
+            let arguments = &tried[which].0.arguments;
+            let options = with_more(options, made.values.len());
+            let rough = made
+                .plant
+                .clone()
+                .with_accuracy(GLANCED_ACCURACY)
+                .with_most_steps(MOST_STEPS);
+            let inner = study.of(&rough, &options).ok()?;
+            // Where an observer had to follow what was missing, a free run may do now.
+            let mut starts = vec![from.clone()];
+            if from.form != fit.form {
+                let mut point = from.point.clone();
+                let gains = states * outputs;
+                point.extend(&fit.point[fit.point.len() - gains..]);
+                point.extend(std::iter::repeat_n(0.0, made.new_states * outputs));
+                starts.push(Fit {
+                    form: fit.form,
+                    point,
+                    ..from
+                });
+            }
+            let best = starts
+                .iter()
+                .filter_map(|start| match made.new_states {
+                    0 => inner.compare(start, COMPARED),
+                    _ => inner.refit(start, 1, THOROUGH),
+                })
+                .filter(|fit| fit.form == Form::Innovation || inner.follows(fit))
+                .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
+            let gain = fit.criterion - best.criterion - searched(&lead, recordings);
+            let argument = lead.argument.map(|a| &arguments[a]);
+            Some(Fitted {
+                depends: argument.map_or_else(Vec::new, |a| plant.spec.names(&a.variables)),
+                argument: argument.map_or_else(String::new, |a| a.expression.clone()),
+                range: argument.map_or((0.0, 0.0), |a| (a.quantile(0.0), a.quantile(1.0))),
+                travel: argument.map_or(0.0, |a| a.travel(recordings[0].sample_time)),
+                shapes: best.point[parameters..][..lead.shapes.len()].to_vec(),
+                lead,
+                candidate: made,
+                fit: best,
+                gain,
+                hypothesis: None,
+                proved: false,
+            })
+        })
+        .collect();
+    let mut fitted = finished(fitted, study, fit, recordings, options);
+    fitted.retain(|f| f.gain <= NEEDED || f.gain_without_few(study, fit, options) > NEEDED);
+    // Values of the fit may make another name of a term.
+    fitted.retain(|f| scope.allows(named(&plant.spec, f)));
+    let mut origins = vec![fit];
+    origins.extend(tried.iter().skip(1).map(|(_, white)| white));
+    let ground = Ground {
+        plant,
+        study,
+        fit,
+        origins,
+        recordings,
+        options,
+    };
+    fitted.extend(trials(&scope.hypotheses, open, &ground));
+    fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    drop_repeated(&mut fitted);
+    order(&plant.spec, &mut fitted);
+    // A formula says in two or three numbers what a curve says in nine.
+    if let (Some(best), Some((screen, _))) = (fitted.first(), tried.first()) {
+        let mut better = formulas(best, &screen.arguments, &ground);
+        better.retain(|f| f.gain > best.gain);
+        better.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        fitted.splice(0..0, better);
+    }
+    (fitted, strongest)
+}
