@@ -349,6 +349,7 @@ impl Answer<'_> {
             } else {
                 Vec::new()
             },
+            equations: None,
         }
     }
 

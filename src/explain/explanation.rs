@@ -285,6 +285,23 @@ pub struct Location {
     pub frequency: Vec<[f64; 3]>,
     /// Operating regions in which the difference is larger than elsewhere.
     pub regime: Vec<Regime>,
+    /// Where in the equations of a simulator that has them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub equations: Option<EquationMap>,
+}
+
+/// For every place in the equations and every variable the strongest score test, before anything was added.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EquationMap {
+    /// Equations, inputs, parameters and sensors.
+    pub places: Vec<String>,
+    /// Variables, differences and products of them, and `time`.
+    pub variables: Vec<String>,
+    /// Part of what the simulator leaves, whitened, that the best term of this variable at this place would take off: a row for
+    /// each place, a column for each variable; null where no term was tested.
+    pub share: Vec<Vec<Option<f64>>>,
+    /// The same by chance: the largest of all tests stays below it with 99 % probability.
+    pub significant: f64,
 }
 
 /// An operating region.

@@ -84,10 +84,10 @@ pub use engine::scope::UnknownPlantEffect;
 pub use error::ExplainError;
 pub use explanation::{
     Alternative, AugmentedModel, AugmentedPlant, Curve, Detectable, EXPLANATION_FORMAT,
-    EffectFound, EffectSize, Evidence, Explanation, FitFigure, FitSteps, FitTable, HypothesisFit,
-    HypothesisFound, HypothesisRival, HypothesisVerdict, Law, Location, Mechanics, ModelEffect,
-    NoiseFound, ParameterChange, Quantity, Regime, Remaining, SignalReference, SignalTraces,
-    StatePrior, Verdict,
+    EffectFound, EffectSize, EquationMap, Evidence, Explanation, FitFigure, FitSteps, FitTable,
+    HypothesisFit, HypothesisFound, HypothesisRival, HypothesisVerdict, Law, Location, Mechanics,
+    ModelEffect, NoiseFound, ParameterChange, Quantity, Regime, Remaining, SignalReference,
+    SignalTraces, StatePrior, Verdict,
 };
 pub use plant_answer::{
     AugmentedPlantError, Original, PlantOptions, PlantQuestionError, explain_plant,

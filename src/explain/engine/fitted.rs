@@ -3,7 +3,7 @@
 use super::candidate::Candidate;
 use super::hypothesis::prefer_asked;
 use super::library::Starts;
-use super::names::{name_rank, rank};
+use super::names::{name_rank, named, rank, special_case};
 use super::screen::Lead;
 use crate::physics::ModelSpec;
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
@@ -88,6 +88,20 @@ pub(super) fn searched(lead: &Lead, recordings: &[PlantRecording]) -> f64 {
         .sum()
 }
 
+/// A form with more numbers than the special case that it contains follows errors of both: it must gain clearly more.
+fn prefer_special_case(spec: &ModelSpec, fitted: &mut [Fitted]) {
+    let Some(first) = fitted.first() else { return };
+    let tie = TIE_WITH_CURVE.0.max(TIE_WITH_CURVE.1 * first.gain);
+    let least = first.gain - tie;
+    if let Some(wanted) = special_case(named(spec, first))
+        && let Some(at) = fitted
+            .iter()
+            .position(|f| named(spec, f) == wanted && f.gain >= least)
+    {
+        fitted[..=at].rotate_right(1);
+    }
+}
+
 /// Puts fits in the order in which they are given as answers, from one by their gains.
 pub(super) fn order(spec: &ModelSpec, fitted: &mut [Fitted]) {
     // Among those that explain the recording as well as the best, the one with a name of its own comes first. Of several such
@@ -101,6 +115,7 @@ pub(super) fn order(spec: &ModelSpec, fitted: &mut [Fitted]) {
         let equal = |f: &&Fitted| first - f.gain <= TIE.0 && name_rank(spec, f) == of_name;
         let equals = fitted[..ties].iter().take_while(equal).count();
         fitted[..equals].sort_by_key(|f| rank(spec, f));
+        prefer_special_case(spec, fitted);
         prefer_asked(fitted);
     }
 }

@@ -12,6 +12,7 @@ mod formulas;
 pub(crate) mod holdout;
 pub(crate) mod hypothesis;
 pub(crate) mod library;
+mod map;
 pub(crate) mod names;
 mod path;
 mod projection;

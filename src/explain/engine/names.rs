@@ -89,6 +89,11 @@ fn flows(unit: &str) -> bool {
     )
 }
 
+/// Whether the square of a quantity with this unit may be a heat: a current, a voltage, or what has no unit.
+fn may_heat(unit: &str) -> bool {
+    matches!(unit, "A" | "mA" | "V" | "mV" | "W" | "")
+}
+
 /// Whether a variable is in no equation of the plant.
 fn unused(spec: &ModelSpec, v: VariableId) -> bool {
     !spec.expressions.any(|n| *n == Node::Variable(v))
@@ -131,6 +136,11 @@ pub(crate) fn family(id: &str) -> &str {
     }
 }
 
+/// The special case of a form that has a name too.
+pub(super) fn special_case(id: &str) -> Option<&'static str> {
+    (id == "stribeck_friction").then_some("coulomb_friction")
+}
+
 /// Bristles that yield within this part of the travel are dry friction.
 const YIELDS: f64 = 0.12;
 
@@ -161,7 +171,8 @@ pub(crate) fn called(
         (Port::Input, id) => id,
         (Port::Parameter, "parameter_step" | "parameter_ramp") => "parameter_change",
         (Port::Parameter, "parameter_heating")
-            if unit_of_place == "Ohm" || heats_itself(spec, own, variables) =>
+            if unit_of_place == "Ohm" && variables.iter().all(|&v| may_heat(unit(v)))
+                || heats_itself(spec, own, variables) =>
         {
             "temperature_dependent_resistance"
         }

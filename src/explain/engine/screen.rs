@@ -10,10 +10,13 @@ use super::argument::{Argument, ArgumentForm, arguments};
 use super::curve::{Curve, curves};
 use super::edit::{Place, enters_several, is_of, sensors};
 use super::library::{Needs, Port, Starts, TERMS, Term};
+use super::map::map;
 use super::names::{heats_itself, is_without_units, rank_of};
 use super::path::{Hooked, Path, hooked, path};
 use super::projection::{Projection, SIGNATURE};
+use super::thresholds::significant;
 use super::values::{Instance, evaluate, grid};
+use crate::explain::explanation::EquationMap;
 use crate::explain::locate::spectrum;
 use crate::noise::Series;
 use crate::physics::estimate::{Fit, PlantRecording, Study};
@@ -102,6 +105,7 @@ pub(crate) struct Screen {
     pub(crate) leads: Vec<Lead>,
     /// Curves at the best places, best first.
     pub(crate) curves: Vec<Lead>,
+    pub(crate) map: EquationMap,
     /// Number of tests.
     pub(crate) tests: usize,
     /// Whether the states were not those of the fit: it is far from what its terms would make of it.
@@ -205,6 +209,8 @@ pub(crate) fn screen(
         .collect();
     leads.extend(found);
     leads.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
+    let significant = significant(count) / study.information();
+    let map = map(&leads, spec, &arguments, study.count(), significant);
     let leads = distinct(leads, spec, &arguments);
     let whiten = |series: &Series| fit.noise.whiten_kept(series, study.mask());
     let curves = curves(
@@ -219,6 +225,7 @@ pub(crate) fn screen(
     Some(Screen {
         leads,
         curves,
+        map,
         tests: count,
         strays: !std::ptr::eq(fit, along),
         arguments,

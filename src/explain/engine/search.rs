@@ -11,8 +11,9 @@ use super::names::named;
 use super::scope::Scope;
 use super::second_effect::{determined, differs};
 use super::select::EQUAL;
-use super::step::{Stage, improved, step};
+use super::step::{Stage, Step, improved, step};
 use super::thresholds::{BETTER_FITS, FINISHED, MOST, NEEDED, SECOND};
+use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{EstimateError, EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, Plant};
 
@@ -33,6 +34,8 @@ pub(crate) struct Found {
     pub(crate) options: EstimateOptions,
     /// Information in a value of what the fit leaves, as a part of that in a value with independent noise.
     pub(crate) information: f64,
+    /// Where in the equations tests find something before an effect is added.
+    pub(crate) map: Option<EquationMap>,
     /// Free runs in blocks that the fit had not seen, without and with the effects; none where the plant does not run freely.
     pub(crate) held_out: Option<[HeldOut; 2]>,
 }
@@ -175,6 +178,7 @@ pub(crate) fn search(
     let mut now = plant.clone();
     let mut fit = baseline.clone();
     let mut tests = Vec::new();
+    let mut first_map = None;
     let mut accepted_so_far = 0;
     let mut asked = vec![Trial::default(); scope.hypotheses.len()];
     // One effect more than may be named: the first may be dropped again.
@@ -197,7 +201,11 @@ pub(crate) fn search(
             Some(first) => SECOND.0.max(SECOND.1 * first.gain),
         };
         let mut attempts = 0;
-        let (mut fitted, strongest) = loop {
+        let Step {
+            mut fitted,
+            strongest,
+            map,
+        } = loop {
             let stage = Stage {
                 plant: &now,
                 study: &study,
@@ -213,13 +221,13 @@ pub(crate) fn search(
             };
             let found = step(&stage);
             attempts += 1;
-            let again = (attempts <= BETTER_FITS).then(|| improved(&stage, &found.0));
+            let again = (attempts <= BETTER_FITS).then(|| improved(&stage, &found.fitted));
             let Some(better) = again.flatten() else {
                 break found;
             };
             let lost = fit.criterion - better.criterion;
-            let (mut fitted, strongest) = found;
-            let most = fitted.iter().map(|f| f.gain).fold(0.0, f64::max);
+            let mut found = found;
+            let most = found.fitted.iter().map(|f| f.gain).fold(0.0, f64::max);
             match steps.last_mut().and_then(|s| s.first_mut()) {
                 None => baseline = better.clone(),
                 Some(last) => {
@@ -230,8 +238,8 @@ pub(crate) fn search(
             fit = better;
             // All gains are less by the same amount; where that is little of the best, candidates need not be fitted again.
             if lost < TIE.1 * most {
-                fitted.iter_mut().for_each(|f| f.gain -= lost);
-                break (fitted, strongest);
+                found.fitted.iter_mut().for_each(|f| f.gain -= lost);
+                break found;
             }
         };
         if least_squares {
@@ -245,6 +253,7 @@ pub(crate) fn search(
             }
         }
         tests.push(strongest);
+        first_map = first_map.or(map);
         let first = steps.first().and_then(|s| s.first());
         let new = |f: &&Fitted| {
             first.is_none_or(|first| {
@@ -311,5 +320,6 @@ pub(crate) fn search(
         options,
         information: 1.0,
         held_out: None,
+        map: first_map,
     })
 }

@@ -8,6 +8,7 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::holdout::{EXPLAINED, Estimator, HeldOut, all_free, as_given, free_run_error, held_out};
+use super::names::named;
 use super::scope::Scope;
 use super::search::{Found, Objective, search};
 use super::thresholds::{MOST_STEPS, SECOND, chance};
@@ -76,6 +77,12 @@ pub(crate) fn select(
             rivals.extend(self::rivals(&found, 1, recordings, hold));
             searches.push(found);
         }
+        // A second effect that only free runs show, beside a first that both searches find, is what the formula of the first
+        // leaves.
+        let most = match &searches[..] {
+            [likely, free_run] if same_first(plant, likely, free_run) => likely.accepted,
+            _ => usize::MAX,
+        };
         // What the likelihood proves with as many values as are independent, and explains the free run too, gives way only to
         // what explains it as clearly better.
         let kept = best(&rivals, |r| (r.search, r.accepted) == chosen)
@@ -84,6 +91,7 @@ pub(crate) fn select(
             .iter()
             .filter(|r| !worsens(&rivals, r.search, r.accepted))
             .filter(|r| r.search == 0 || kept.is_none() || explains(r, kept))
+            .filter(|r| r.search == 0 || r.accepted <= most)
             .collect();
         chosen = match winner(&improving) {
             // Without an effect the tests of the likelihood count.
@@ -112,6 +120,19 @@ pub(crate) fn select(
         }
     }
     Ok(found)
+}
+
+/// Whether two searches have found the same effect first.
+fn same_first(plant: &Plant, a: &Found, b: &Found) -> bool {
+    let first = |found: &Found| {
+        let best = found
+            .steps
+            .first()?
+            .first()
+            .filter(|_| found.accepted > 0)?;
+        Some((named(&plant.spec, best), best.lead.place))
+    };
+    first(a).is_some() && first(a) == first(b)
 }
 
 /// Whether a free run takes more than half of the mean square off that of another, in blocks left out.

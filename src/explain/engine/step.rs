@@ -16,6 +16,7 @@ use super::thresholds::{
     AT_A_PLACE, BETTER, COMPARED, FINISHED, FITTED, FORETOLD, GLANCE, GLANCED, GLANCED_ACCURACY,
     GLANCED_STEPS, IMITATED, LEFT, MOST, MOST_STEPS, NEEDED, OF_A_KIND, THOROUGH, chance,
 };
+use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{ModelSpec, Plant};
 
@@ -95,15 +96,17 @@ pub(super) fn improved(stage: &Stage, fitted: &[Fitted]) -> Option<Fit> {
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
 }
 
-/// Of fits of one term from several starts keeps the best, which comes first.
-fn drop_repeated(fitted: &mut Vec<Fitted>) {
+/// Of fits of one term from several starts the best.
+fn drop_repeated(mut fitted: Vec<Fitted>) -> Vec<Fitted> {
+    fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut known: Vec<(&str, Place, String)> = Vec::new();
     fitted.retain(|f| {
         let this = (f.lead.term.id, f.lead.place, f.argument.clone());
-        let new = f.hypothesis.is_some() || !known.contains(&this);
+        let new = !known.contains(&this);
         known.push(this);
         new
     });
+    fitted
 }
 
 /// Where the fit of a candidate starts: with the other numbers as they were, or as the regression on its term moves them.
@@ -127,8 +130,17 @@ fn started(inner: &Study, made: &Candidate, lead: &Lead, (study, from): (&Study,
     }
 }
 
-/// Fits the leads of a plant; best first. Also the strongest test, and how many there were.
-pub(super) fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
+/// What a step has found.
+pub(super) struct Step {
+    /// Candidates, best first.
+    pub(super) fitted: Vec<Fitted>,
+    /// The strongest test, and how many there were.
+    pub(super) strongest: (f64, usize),
+    pub(super) map: Option<EquationMap>,
+}
+
+/// Fits the leads of a plant.
+pub(super) fn step(stage: &Stage) -> Step {
     let Stage {
         plant,
         study,
@@ -153,6 +165,7 @@ pub(super) fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
         let best = s.leads.first().map_or(0.0, |l| l.statistic);
         (study.information() * best, s.tests)
     });
+    let map = tried.first().map(|(s, _)| s.map.clone());
     // Beside an effect that was found, a second one is looked for only where a test says that something is left.
     let insignificant = chance(strongest.0) * strongest.1 as f64 > LEFT;
     let nothing_left = accepted > 0 && insignificant || accepted == MOST;
@@ -309,6 +322,7 @@ pub(super) fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
             })
         })
         .collect();
+    let fitted = drop_repeated(fitted);
     let mut fitted = finished(fitted, study, fit, recordings, options);
     fitted.retain(|f| f.gain <= NEEDED || f.gain_without_few(study, fit, options) > NEEDED);
     // Values of the fit may make another name of a term.
@@ -325,7 +339,6 @@ pub(super) fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
     };
     fitted.extend(trials(&scope.hypotheses, open, &ground));
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    drop_repeated(&mut fitted);
     order(&plant.spec, &mut fitted);
     // A formula says in two or three numbers what a curve says in nine.
     if let (Some(best), Some((screen, _))) = (fitted.first(), tried.first()) {
@@ -334,5 +347,9 @@ pub(super) fn step(stage: &Stage) -> (Vec<Fitted>, (f64, usize)) {
         better.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         fitted.splice(0..0, better);
     }
-    (fitted, strongest)
+    Step {
+        fitted,
+        strongest,
+        map,
+    }
 }

@@ -57,3 +57,9 @@ pub(crate) const MOST: usize = 2;
 pub(crate) fn chance(statistic: f64) -> f64 {
     ChiSquared::new(1.0).map_or(1.0, |law| law.sf(statistic))
 }
+
+/// The statistic that the strongest of so many tests reaches by chance with probability [`LEFT`].
+pub(crate) fn significant(tests: usize) -> f64 {
+    let each = LEFT / tests.max(1) as f64;
+    ChiSquared::new(1.0).map_or(f64::INFINITY, |law| law.inverse_cdf(1.0 - each))
+}

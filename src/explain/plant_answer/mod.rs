@@ -253,6 +253,7 @@ impl Answer<'_> {
                     outputs.clone()
                 },
                 port: self.port(),
+                equations: self.found.map.clone(),
                 ..Location::default()
             },
             fit: FitTable {

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::equation_map::{MapView, equation_map};
 use super::explanation_words::{capitalised, effect_name, listed, port};
 use super::plot::interval;
 use super::typeset_number::{
@@ -50,6 +51,7 @@ pub(super) struct Where {
     windows: Vec<[String; 2]>,
     bands: Vec<[String; 2]>,
     regimes: Vec<[String; 4]>,
+    map: Option<MapView>,
 }
 
 /// The effects, most important first.
@@ -237,10 +239,12 @@ pub(super) fn location(of: &Explanation) -> Option<Where> {
                 ]
             })
             .collect(),
+        map: place.equations.as_ref().and_then(equation_map),
     };
     let empty = found.sentences.is_empty()
         && found.windows.is_empty()
         && found.bands.is_empty()
-        && found.regimes.is_empty();
+        && found.regimes.is_empty()
+        && found.map.is_none();
     (!empty).then_some(found)
 }

@@ -11,6 +11,7 @@
 //! | `explanation.html`, `sections.html` | the templates                                      |
 
 mod closing;
+mod equation_map;
 mod explanation_view;
 mod explanation_words;
 mod findings;
