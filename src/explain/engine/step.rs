@@ -190,8 +190,11 @@ pub(super) fn step(stage: &Stage) -> Step {
     if !nothing_left
         && let Some(white) = free_run
         && let Some(along) = study.along_recording(&white)
-        && let Some(s) = screen(study, &white, &along, given, recordings)
+        && let Some(mut s) = screen(study, &white, &along, given, recordings)
     {
+        // What depends on inputs or time alone is the same along both.
+        s.leads
+            .retain(|l| l.argument.is_some_and(|a| !s.arguments[a].held));
         tried.push((s, white));
     }
     // Heavy tails discount what is rare and large, such as the contact with an end stop, and an observer recovers from it: the
