@@ -40,7 +40,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-fn sources(folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn sources(folder: &Path) -> Vec<PathBuf> {
     let mut sources = files(folder);
     sources.retain(|path| path.extension().is_some_and(|e| e == "rs"));
     sources
@@ -83,13 +83,13 @@ fn without_tests(text: &str) -> (String, BTreeSet<String>) {
 }
 
 /// A path, and what it is called from then on.
-struct Named {
-    path: Vec<String>,
-    alias: Option<String>,
+pub(crate) struct Named {
+    pub(crate) path: Vec<String>,
+    pub(crate) alias: Option<String>,
 }
 
 /// Adds the paths of a use tree, `a::{b, c::d as e}`, each behind `prefix`; gives what follows the tree.
-fn read_tree<'a>(text: &'a str, prefix: &[String], found: &mut Vec<Named>) -> &'a str {
+pub(crate) fn read_tree<'a>(text: &'a str, prefix: &[String], found: &mut Vec<Named>) -> &'a str {
     let name = |text: &'a str| -> (String, &'a str) {
         let end = text.find(|c: char| !(c.is_alphanumeric() || c == '_'));
         let (name, rest) = text.split_at(end.unwrap_or(text.len()));

@@ -14,7 +14,7 @@ use super::step::Accuracy;
 use super::tape::{SwitchSlots, Tape};
 
 /// Error of one step that is allowed, as a part of how far a state has moved so far. Errors add up along the recording; with
-/// this value the answers of 64 plants of eight kinds are within 1e-6 of their range (`tests/physics_simulate.rs`).
+/// this value the answers of 64 plants of eight kinds are within 1e-6 of their range (`tests/plants/physics_simulate.rs`).
 pub(super) const STEP_ACCURACY: f64 = 1e-8;
 /// Below this depth errors may double with every halving: they are those of jumps and contacts.
 const RARE: u8 = 8;

@@ -1,12 +1,7 @@
 //! `explain` where the simulation is a plant in equations, on recordings of an integrator of its own.
 
-#[path = "support/cart.rs"]
-mod cart;
-#[path = "support/folder.rs"]
-mod folder;
-
-use cart::{CART, explained, explained_with, record};
-use folder::Folder;
+use crate::cart::{CART, explained, explained_with, record};
+use crate::folder::Folder;
 
 #[test]
 fn a_missing_drag_is_named_in_its_equation_and_can_be_simulated() {

@@ -1,9 +1,6 @@
 //! What is done with an estimated plant in equations: show, validate, simulate, its text, its page; and the uncertainty of its
 //! linearisation.
 
-#[path = "support/folder.rs"]
-mod folder;
-
 use std::fs;
 
 use innovant::internal::report::text_alone;
@@ -15,7 +12,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use folder::Folder;
+use crate::folder::Folder;
 
 const PENDULUM: &str = r#"model Pendulum "held up by a torque"
   parameter Real m(unit="kg", min=0.1, max=1) = 0.5;

@@ -1,12 +1,9 @@
 //! `innovant identify --simulator`: programs as simulators. The simulator here is a small Python 3 script.
 
-#[path = "support/folder.rs"]
-mod folder;
-
 use std::collections::BTreeSet;
 use std::fs;
 
-use folder::{Folder, Run};
+use crate::folder::{Folder, Run};
 use innovant::physics::{Excitation, Hold, Plant, parse};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,13 +1,8 @@
 //! What `explain` says of a plant in equations holds for data that the fit has not seen, on recordings of an integrator of its
 //! own.
 
-#[path = "support/cart.rs"]
-mod cart;
-#[path = "support/folder.rs"]
-mod folder;
-
-use cart::{CART, explained, record};
-use folder::Folder;
+use crate::cart::{CART, explained, record};
+use crate::folder::Folder;
 
 /// The values of a column of outputs changed one by one, with their place counted from 0 and their number.
 fn with_outputs(folder: &Folder, name: &str, change: impl Fn(f64, usize, usize) -> f64) {

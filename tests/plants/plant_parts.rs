@@ -1,11 +1,8 @@
 //! A part that is coupled to the rest, where the simulation has one body: on a shaft that twists, and with play.
 
-#[path = "support/folder.rs"]
-mod folder;
-
 use std::fmt::Write;
 
-use folder::{Folder, json};
+use crate::folder::{Folder, json};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,12 +1,7 @@
 //! `explain --hypothesis` on recordings of an integrator of its own.
 
-#[path = "support/cart.rs"]
-mod cart;
-#[path = "support/folder.rs"]
-mod folder;
-
-use cart::{CART, explained_with, record};
-use folder::Folder;
+use crate::cart::{CART, explained_with, record};
+use crate::folder::Folder;
 use serde_json::Value;
 
 const DRAG: &str = "drag: m*der(v) += -c*v*abs(v), c > 0 [N.s2/m2]";
@@ -113,7 +108,7 @@ fn a_wrong_hypothesis_does_not_hide_what_is_missing() {
         printed.contains("Hypothesis dry: NOT SUPPORTED."),
         "{printed}"
     );
-    let said = folder::json(&folder.join("e.json"));
+    let said = crate::folder::json(&folder.join("e.json"));
     assert!(
         rivals(&said["hypotheses"][0]).contains(&"quadratic_drag"),
         "{said:#}"
@@ -127,7 +122,7 @@ fn what_enters_an_input_is_found_from_a_few_starts() {
     folder.text("cart.mo", CART);
     // The force is bent at its upper end: the library has no such term.
     let bent = |u: f64| 15.0 * (u / 15.0).tanh() - u;
-    cart::record_with_input(&folder, "log.csv", 1.0, move |u, _, _, _| bent(u), 3);
+    crate::cart::record_with_input(&folder, "log.csv", 1.0, move |u, _, _, _| bent(u), 3);
     let said = explained_with(
         &folder,
         "log.csv",

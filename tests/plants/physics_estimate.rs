@@ -1,6 +1,6 @@
 //! Coverage of the intervals of plants in equations, on recordings drawn by an integrator of this file.
 //!
-//! `INNOVANT_PLANT_RUNS=200 cargo test --release --test physics_estimate -- --nocapture` draws more, and checks the bounds of
+//! `INNOVANT_PLANT_RUNS=200 cargo test --release --test plants physics_estimate -- --nocapture` draws more, and checks the bounds of
 //! `docs/accuracy.md`.
 
 use innovant::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};

@@ -1,0 +1,18 @@
+//! Plants in equations: read, simulated, estimated, explained, and the programs that stand in for them. One binary, because
+//! each links the whole library.
+
+#[path = "../support/cart.rs"]
+mod cart;
+mod external_simulator;
+#[path = "../support/folder.rs"]
+mod folder;
+mod physics_estimate;
+mod physics_messages;
+mod physics_mutations;
+mod physics_simulate;
+mod physics_texts;
+mod plant_cli;
+mod plant_explain;
+mod plant_held_out;
+mod plant_hypotheses;
+mod plant_parts;
