@@ -18,7 +18,7 @@ def test_poles_are_found_in_closed_loop(model):
     assert model.covariance.shape == (40, 40)
     assert np.linalg.eigvalsh(model.covariance).min() > -1e-12
     assert np.linalg.eigvalsh(model.innovation_covariance).min() > 0.5
-    assert "nothing left to explain" in model.verdict
+    assert "residuals are white" in model.verdict
     assert model.residual_tests.rejected is False
     assert model.residual_tests.feedback.p_value < 1e-6
 

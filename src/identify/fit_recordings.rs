@@ -68,7 +68,7 @@ fn shifted(records: &mut dyn Records, options: &Options, plain: &Fit) -> Option<
         0,
         format!(
             "dead time: {}; no coefficient of the vector ARX model is significant up to there (p > {LEVEL}), and with the input \
-             shifted order {} does what takes order {} without (Schwarz's criterion is smaller by {gain:.0}); --delay 0 \
+             shifted order {} does what takes order {} without (its BIC is smaller by {gain:.0}); --delay 0 \
              leaves it out",
             said.join(", "),
             shifted.summary.order,

@@ -94,7 +94,7 @@ pub(super) fn decide(validation: &mut Validation, noise_model: bool) {
             "no test of the residuals applies: judge the model by its fit".to_owned()
         } else {
             format!(
-                "nothing left to explain at the {} % level",
+                "the residuals are white at the {} % level",
                 plain(100.0 * level)
             )
         });

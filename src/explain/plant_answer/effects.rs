@@ -250,6 +250,9 @@ impl Answer<'_> {
 
 /// The id in words, as a sentence begins with it.
 fn spoken(id: &str) -> String {
+    if id == "law" {
+        return "An unlisted function".to_owned();
+    }
     let words = id.replace('_', " ");
     let mut letters = words.chars();
     letters.next().map_or(String::new(), |first| {

@@ -172,7 +172,7 @@ fn select_by(
             let best = best_by_schwarz(&evidence, |e| list.contains(&e.order)).unwrap_or(list[0]);
             (
                 best,
-                format!("order {best}: smallest Schwarz criterion of those asked for"),
+                format!("order {best}: smallest BIC of those asked for"),
             )
         }
         Order::Auto => choose_order(&mut evidence, varx, &mut estimator)?,
@@ -421,7 +421,7 @@ fn choose_order(
         let reason = if order < proposal {
             format!(
                 "the singular value criterion proposes {proposal}, but the chi-square test accepts {order}, and the \
-                 Schwarz criterion does not regret the rest"
+                 BIC is not larger without the rest"
             )
         } else if order == 1 {
             "smallest singular value criterion, and the chi-square test accepts it".to_owned()
@@ -452,7 +452,7 @@ fn choose_order(
         return Ok((
             order,
             format!(
-                "order {order}: smallest Schwarz criterion; the past window cuts off too much of order {start} \
+                "order {order}: smallest BIC; the past window cuts off too much of order {start} \
                  (truncation {cut_off:.1}) for the chi-square test to tell"
             ),
         ));
@@ -478,7 +478,7 @@ fn choose_order(
     Ok((
         order,
         format!(
-            "order {order}: smallest Schwarz criterion of those that could be computed; the chi-square test accepts \
+            "order {order}: smallest BIC of those that could be computed; the chi-square test accepts \
              none of them, so the plant is not linear of a low order, or the past window is too short for it"
         ),
     ))

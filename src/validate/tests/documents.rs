@@ -113,7 +113,7 @@ fn the_document_has_numbers_only() {
         assert_eq!(v.autocorrelation.len(), 4);
         assert_eq!(v.cross_correlation.len(), 4);
         assert_eq!(v.cross_correlation[0].values.len(), v.lags);
-        assert_eq!(v.findings[0], "nothing left to explain at the 1 % level");
+        assert_eq!(v.findings[0], "the residuals are white at the 1 % level");
         let (one, free) = (v.one_step.fit_percent, v.free_run.unwrap().fit_percent);
         assert!(one > free && free > 50.0 && one < 100.0);
     }

@@ -44,7 +44,12 @@ pub(super) fn equation_map(of: &EquationMap) -> Option<MapView> {
             .filter_map(|r| at(r, column))
             .fold(0.0, f64::max)
     };
-    let rows = strongest(places, ROWS, row_best);
+    let mut rows = strongest(places, ROWS, row_best);
+    let shaded = rows
+        .iter()
+        .filter(|&&r| row_best(r) > of.significant)
+        .count();
+    rows.truncate(shaded.max(1));
     let columns = strongest(variables, COLUMNS, column_best);
     let most = rows.iter().map(|&r| row_best(r)).fold(0.0, f64::max);
     if most <= 0.0 {

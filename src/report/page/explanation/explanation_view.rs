@@ -6,7 +6,7 @@ use super::closing::{Left, Provenance, changes, detectable, left, noise, provena
 use super::explanation_words::{class, headline, kind, sentence};
 use super::findings::{Asked, Finding, Rival, Where, asked, findings, location, rivals};
 use super::head::{Head, sections};
-use super::maps::{frequency_maps, learned_curve};
+use super::maps::{frequency_maps, laws, learned_curve};
 use super::plot::Group;
 use super::proof::{Proof, proof};
 use super::signals::groups;
@@ -44,6 +44,7 @@ pub(super) struct View {
 pub(super) fn view(of: &Explanation) -> View {
     let mut maps = frequency_maps(of);
     maps.extend(learned_curve(of));
+    maps.extend(laws(of));
     let headline = headline(of);
     let (signals, findings, location) = (groups(of), findings(of), location(of));
     let (rivals, changes) = (rivals(of), changes(of));

@@ -5,6 +5,7 @@ use crate::explain::{EffectFound, Explanation, Verdict};
 /// What people call an effect: `coulomb_friction` is `Coulomb friction`.
 pub(super) fn effect_name(id: &str) -> String {
     let text = match id {
+        "law" => "unlisted function",
         "input_delay" => "input delay",
         "sensor_rectification" => "rectified sensor (absolute value)",
         "sensor_freeze" => "frozen sensor",
@@ -26,12 +27,13 @@ pub(super) fn effect_name(id: &str) -> String {
 
 /// The name with its article, as it stands within a sentence.
 fn with_article(id: &str) -> String {
-    const COUNTED: [&str; 17] = [
+    const COUNTED: [&str; 18] = [
         "end_stop",
         "input_dead_zone",
         "input_rate_limit",
         "input_asymmetry",
         "input_delay",
+        "law",
         "actuator_lag",
         "sensor_offset",
         "sensor_drift",

@@ -123,7 +123,7 @@ fn evidence(of: &Evidence) -> Vec<[String; 3]> {
         return Vec::new();
     }
     let mut rows = vec![[
-        "Gain in Schwarz’s criterion".to_owned(),
+        "Gain in BIC".to_owned(),
         number(of.criterion_gain, 3),
         format!("needed: {}", number(of.criterion_needed, 3)),
     ]];

@@ -1,6 +1,6 @@
 //! The pictures over frequency and over the variable of the learned law.
 
-use super::explanation_words::{effect_name, listed};
+use super::explanation_words::{capitalised, effect_name, listed};
 use super::plot::{Axis, Drawing, Group, Kind, Plot, Series, Shade, interval};
 use super::signals::answers_differ;
 use super::typeset_number::fixed;
@@ -99,6 +99,44 @@ fn frequency_map(of: &Explanation, s: &SignalTraces, many: bool) -> Option<Group
         linked: false,
         beside: false,
     })
+}
+
+/// What each effect adds to its equation, over the variable that it depends on.
+pub(super) fn laws(of: &Explanation) -> Vec<Group> {
+    let all = of.effects.iter().filter_map(|e| Some((e, e.law.as_ref()?)));
+    let drawn = all.enumerate().map(|(k, (effect, law))| {
+        let points = || law.at.iter().copied().zip(law.value.iter().copied());
+        let around = points().zip(&law.std).map(|((at, value), std)| {
+            let std = if std.is_finite() { *std } else { 0.0 };
+            (at, value - 2.0 * std, value + 2.0 * std)
+        });
+        let y = Axis::new("added", "").over(around.clone().flat_map(|(_, a, b)| [a, b]));
+        let place = effect.enters.as_ref().unwrap_or(&effect.signal);
+        Group {
+            id: format!("law-{k}"),
+            title: format!("{} against {}", capitalised(&effect_name(&effect.effect)), law.variable),
+            caption: String::new(),
+            plots: vec![Plot {
+                title: format!("Added to the equation of {place}"),
+                caption: "Over the values that the recording covers, with two standard deviations, given the form."
+                    .to_owned(),
+                height: "middle",
+                drawing: Drawing {
+                    x: Axis::new(&law.variable, "").over(law.at.iter().copied()),
+                    y,
+                    series: vec![
+                        Series::line("added", "augmented", points())
+                            .within("± 2 deviations", around),
+                    ],
+                    ..Drawing::default()
+                },
+            }],
+            folded: false,
+            linked: false,
+            beside: false,
+        }
+    });
+    drawn.collect()
 }
 
 /// The law as the recording shows it, and the fitted one over it.

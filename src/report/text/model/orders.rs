@@ -44,7 +44,7 @@ fn table<'a>(summary: &Summary, evidence: impl Iterator<Item = &'a OrderEvidence
         "chi-square",
         "freedom",
         "p",
-        "Schwarz",
+        "BIC",
         "spectral radius",
     ]);
     let number = |value: Option<f64>, digits: usize| {

@@ -69,10 +69,8 @@ pub(crate) fn headline(of: &Headline) -> String {
 /// What an acceptance rests on.
 pub(crate) fn in_words(tests: &Validation) -> &'static str {
     match (&tests.whiteness, &tests.linearity) {
-        (_, Some(_)) => "nothing left to explain, the residuals are white and linear in the past",
-        (Some(_), None) => {
-            "nothing left to explain, the residuals are white; linearity was not tested"
-        }
+        (_, Some(_)) => "the residuals are white and linear in the past",
+        (Some(_), None) => "the residuals are white; linearity was not tested",
         (None, None) => "nothing speaks against it; linearity was not tested",
     }
 }
@@ -80,7 +78,7 @@ pub(crate) fn in_words(tests: &Validation) -> &'static str {
 /// The findings but those that the tables say already: that nothing was found, why there is no free run.
 pub(crate) fn findings(tests: &Validation) -> Vec<String> {
     let said = [
-        "nothing left to explain",
+        "the residuals are white",
         "no free run: ",
         "too short to judge: ",
         "linearity was ",
