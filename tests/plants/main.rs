@@ -16,3 +16,4 @@ mod plant_explain;
 mod plant_held_out;
 mod plant_hypotheses;
 mod plant_parts;
+mod plant_search;

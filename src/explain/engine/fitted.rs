@@ -32,7 +32,9 @@ pub(crate) struct Fitted {
     pub(crate) fit: Fit,
     /// Gain in the criterion over the plant without it, less the penalty of the search.
     pub(crate) gain: f64,
-    /// Whether blocks left out prove it, whatever the gain.
+    /// Whether it takes more than half of the mean square off blocks left out, whatever the gain.
+    pub(crate) explains: bool,
+    /// ... and off what any other function leaves there.
     pub(crate) proved: bool,
     /// Place in the user's hypotheses; none for a term of the library.
     pub(crate) hypothesis: Option<usize>,

@@ -10,7 +10,6 @@ use super::library::Needs;
 use super::names::named;
 use super::scope::Scope;
 use super::second_effect::{determined, differs};
-use super::select::EQUAL;
 use super::step::{Stage, Step, improved, step};
 use super::thresholds::{BETTER_FITS, FINISHED, MOST, NEEDED, SECOND};
 use crate::explain::explanation::EquationMap;
@@ -84,9 +83,10 @@ impl Found {
     }
 }
 
-/// What blocks left out say of free runs, where values that depend on each other make a criterion weak: a candidate that takes
-/// more than half of the mean square off them is proved. One that halves again what the best leaves comes before it. What depends
-/// on time alone is not proved so: its value in a block is a level that any slow error has.
+/// What blocks left out say of free runs, where values that depend on each other make a criterion weak: a candidate is accepted
+/// that takes more than half of the mean square off them, and named where it takes as much off what any other function leaves.
+/// One that halves what the best leaves comes before it. What depends on time alone is not accepted so: its value in a block is a
+/// level that any slow error has.
 fn judge_by_blocks(
     fitted: &mut [Fitted],
     (plant, fit): (&Plant, &Fit),
@@ -102,7 +102,11 @@ fn judge_by_blocks(
         .into_par_iter()
         .filter_map(|i| Some((i, errors_of(&fitted[i].candidate.plant, &fitted[i].fit)?)))
         .collect();
-    let id = |i: usize| named(&plant.spec, &fitted[i]);
+    // At one place, of one variable, two names are two forms of one function.
+    let elsewhere = |i: usize, j: usize| {
+        let of = |f: &Fitted| (f.lead.place, f.argument.clone());
+        of(&fitted[i]) != of(&fitted[j])
+    };
     let explains = |errors: &HeldOut| errors.removed(&without) >= EXPLAINED;
     let provable = |i: usize| fitted[i].lead.term.needs != Needs::Time;
     let mut chosen: Option<&(usize, HeldOut)> = None;
@@ -118,11 +122,13 @@ fn judge_by_blocks(
     let Some((first, errors)) = chosen else {
         return;
     };
-    let as_good =
-        |(i, other): &&(usize, HeldOut)| id(*i) != id(*first) && other.over(errors) <= 1.0 + EQUAL;
-    let proved = provable(*first) && explains(errors) && !judged.iter().any(|o| as_good(&o));
+    let as_good = |(i, other): &(usize, HeldOut)| {
+        provable(*i) && elsewhere(*i, *first) && errors.removed(other) < EXPLAINED
+    };
+    let explains = provable(*first) && explains(errors);
+    let proved = explains && !judged.iter().any(as_good);
     let first = *first;
-    fitted[first].proved = proved;
+    (fitted[first].explains, fitted[first].proved) = (explains, proved);
     fitted[..=first].rotate_right(1);
 }
 
@@ -268,7 +274,7 @@ pub(crate) fn search(
         let instead = |f: &&Fitted| may_drop && first.is_some_and(|first| f.gain > first.gain);
         let best = fitted.first().filter(|f| new(f) || instead(f));
         let accepted = best
-            .filter(|f| (f.gain > needed || f.proved) && count < MOST)
+            .filter(|f| (f.gain > needed || f.explains) && count < MOST)
             .cloned();
         let Some(best) = accepted else {
             if steps.is_empty() {

@@ -90,7 +90,13 @@ pub(crate) fn select(
         let improving: Vec<&Rival> = rivals
             .iter()
             .filter(|r| !worsens(&rivals, r.search, r.accepted))
-            .filter(|r| r.search == 0 || kept.is_none() || explains(r, kept))
+            .filter(|r| match kept {
+                Some(kept) if r.search > 0 => simpler(r, kept) || explains(r, Some(kept)),
+                Some(kept) if r.accepted == kept.accepted => {
+                    !rivals.iter().any(|o| simpler(o, kept))
+                }
+                _ => true,
+            })
             .filter(|r| r.search == 0 || r.accepted <= most)
             .collect();
         chosen = match winner(&improving) {
@@ -120,6 +126,13 @@ pub(crate) fn select(
         }
     }
     Ok(found)
+}
+
+/// Whether a free run with fewer effects, but some, of another search follows all of the data as closely.
+fn simpler(rival: &Rival, than: &Rival) -> bool {
+    rival.search != than.search
+        && (1..than.accepted).contains(&rival.accepted)
+        && rival.whole <= (1.0 + EQUAL) * than.whole
 }
 
 /// Whether two searches have found the same effect first.

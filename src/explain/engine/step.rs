@@ -321,6 +321,7 @@ pub(super) fn step(stage: &Stage) -> Step {
                 fit: best,
                 gain,
                 hypothesis: None,
+                explains: false,
                 proved: false,
             })
         })
@@ -343,10 +344,10 @@ pub(super) fn step(stage: &Stage) -> Step {
     fitted.extend(trials(&scope.hypotheses, open, &ground));
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     order(&plant.spec, &mut fitted);
-    // A formula says in two or three numbers what a curve says in nine.
+    // A formula says in two or three numbers what a curve says in nine. Of equals the curve stays: it is level beyond its ends.
     if let (Some(best), Some((screen, _))) = (fitted.first(), tried.first()) {
         let mut better = formulas(best, &screen.arguments, &ground);
-        better.retain(|f| f.gain > best.gain);
+        better.retain(|f| f.gain > best.gain + TIE.0);
         better.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         fitted.splice(0..0, better);
     }

@@ -68,7 +68,12 @@ fn list() -> String {
     );
     let mut last = "";
     for definition in library().filter(|d| std::mem::replace(&mut last, d.id) != d.id) {
-        let _ = writeln!(text, "  {:width$}  {}", definition.id, definition.name);
+        let _ = writeln!(
+            text,
+            "  {:width$}  {}",
+            definition.id,
+            title(definition.name)
+        );
     }
     text
 }
@@ -94,7 +99,7 @@ fn of_plant(text: &mut String, effect: &PlantEffect) {
 
 fn of_models(text: &mut String, definitions: &[&Definition]) {
     if let Some(first) = definitions.first() {
-        let _ = writeln!(text, "{}: {}", first.id, first.name);
+        let _ = writeln!(text, "{}: {}", first.id, title(first.name));
     }
     text.push_str("With linear models and columns of outputs\n");
     for definition in definitions {
@@ -145,4 +150,9 @@ mod tests {
         let said = effects_text(Some("quadratic_drg")).unwrap_err().to_string();
         assert!(said.contains("did you mean quadratic_drag?"), "{said}");
     }
+}
+
+/// The name of an effect without the comma after which a sentence goes on.
+fn title(name: &str) -> &str {
+    name.trim_end_matches(',')
 }

@@ -156,6 +156,7 @@ impl Hypothesis {
             candidate: made.clone(),
             fit,
             hypothesis: Some(which),
+            explains: false,
             proved: false,
         })
     }

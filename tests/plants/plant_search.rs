@@ -1,0 +1,123 @@
+//! How what is missing is found in a plant in equations: instants, formulas, the map over the equations, and plants whose free
+//! run strays from the recording. Recordings are those of integrators of the tests' own.
+
+use std::fmt::Write;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde_json::Value;
+
+use crate::cart::{CART, explained, record};
+use crate::folder::{Folder, json};
+
+/// The cell of the map over the equations with the largest share: place, variable, and the share.
+fn strongest(said: &Value) -> (String, String, f64) {
+    let map = &said["where"]["equations"];
+    let mut best = (String::new(), String::new(), 0.0);
+    for (row, place) in map["places"].as_array().unwrap().iter().enumerate() {
+        for (column, variable) in map["variables"].as_array().unwrap().iter().enumerate() {
+            let share = map["share"][row][column].as_f64().unwrap_or(0.0);
+            if share > best.2 {
+                let text = |v: &Value| v.as_str().unwrap().to_owned();
+                best = (text(place), text(variable), share);
+            }
+        }
+    }
+    best
+}
+
+#[test]
+fn a_load_is_dated_to_the_sample() {
+    let folder = Folder::new();
+    folder.text("cart.mo", CART);
+    // The instant is far from those that the screen begins with, a twentieth of 50 s apart.
+    let load = |_: f64, _: f64, t: f64| if t > 23.47 { 3.0 } else { 0.0 };
+    record(&folder, "log.csv", 1.0, load, 3);
+    let said = explained(&folder, "log.csv");
+    assert_eq!(
+        said["effects"][0]["effect"], "load_step",
+        "{}",
+        said["summary"]
+    );
+    let instant = said["effects"][0]["parameters"]["load_step_t0"]["value"].as_f64();
+    assert!((instant.unwrap() - 23.47).abs() < 0.02, "{instant:?}");
+}
+
+#[test]
+fn a_law_that_nobody_listed_gets_its_formula_and_the_map_its_place() {
+    let folder = Folder::new();
+    folder.text("cart.mo", CART);
+    let rises_and_falls = |_: f64, v: f64, _: f64| -15.0 * (v / 1.5) * (-(v / 1.5).powi(2)).exp();
+    record(&folder, "log.csv", 1.1, rises_and_falls, 5);
+    let said = explained(&folder, "log.csv");
+    let effect = &said["effects"][0];
+    assert_eq!(effect["effect"], "law", "{}", said["summary"]);
+    assert_eq!(
+        (&effect["enters"], &effect["depends"][0]),
+        (&"v".into(), &"v".into())
+    );
+    assert!(
+        effect["equation"].as_str().unwrap().contains("exp("),
+        "{effect}"
+    );
+    let width = effect["parameters"]["formula_s"]["value"].as_f64().unwrap();
+    assert!((width - 1.5).abs() < 0.1, "{width}");
+    let (place, variable, share) = strongest(&said);
+    assert_eq!((place.as_str(), variable.as_str()), ("equation of v", "v"));
+    let significant = said["where"]["equations"]["significant"].as_f64().unwrap();
+    assert!(share > significant, "{share} {significant}");
+    let page = std::fs::read_to_string(folder.join("e.html")).unwrap();
+    assert!(
+        page.contains("In the equations, before anything was added"),
+        "no map on the page"
+    );
+}
+
+/// A store that drains slowly, filled by rain and shaken by what nobody measures; above a level it overflows.
+const STORE: &str = r#"model Store "store under rain"
+  parameter Real S(min=0.1, max=0.4) = 0.2 "storage";
+  parameter Real c(unit="d", min=20, max=400) = 100 "drainage";
+  parameter Real d(unit="m", min=0, max=2) = 1 "base";
+  input Real P(unit="mm/d") "rain";
+  output Real head(unit="m");
+  Real h(unit="m", start=1.2);
+equation
+  S*der(h) = P/1000 - (h - d)/c;
+  head = h;
+end Store;
+"#;
+
+#[test]
+fn an_overflow_is_found_where_the_free_run_strays() {
+    let folder = Folder::new();
+    folder.text("store.mo", STORE);
+    let mut dice = ChaCha8Rng::seed_from_u64(11);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut dice) };
+    let mut text = String::from("t,P,head\n");
+    let (mut h, mut wet) = (1.2f64, 0.0f64);
+    for day in 0..1500 {
+        if day % 9 == 0 {
+            wet = (3.0 + 4.0 * normal()).max(0.0);
+        }
+        let rain = (wet + 2.0 * normal()).max(0.0);
+        writeln!(text, "{day},{rain},{}", h + 0.001 * normal()).unwrap();
+        for _ in 0..20 {
+            let over = 0.05 * (h - 1.35).max(0.0);
+            h += 0.05 * (rain / 1000.0 - (h - 1.0) / 100.0 - over) / 0.2;
+        }
+        h += 0.004 * normal();
+    }
+    folder.text("log.csv", &text);
+    let files = ["explain", "log.csv", "--simulation", "store.mo"];
+    let columns = ["--inputs", "P", "--outputs", "head", "--output", "e.json"];
+    folder.run(&[&files[..], &columns].concat()).ok();
+    let said = json(&folder.join("e.json"));
+    let effect = &said["effects"][0];
+    assert_eq!(effect["depends"][0], "h", "{}", said["summary"]);
+    assert!(
+        ["overflow", "law"].contains(&effect["effect"].as_str().unwrap()),
+        "{}",
+        said["summary"]
+    );
+}
