@@ -48,23 +48,23 @@ fn a_load_is_dated_to_the_sample() {
 fn a_law_that_nobody_listed_gets_its_formula_and_the_map_its_place() {
     let folder = Folder::new();
     folder.text("cart.mo", CART);
-    let rises_and_falls = |_: f64, v: f64, _: f64| -15.0 * (v / 1.5) * (-(v / 1.5).powi(2)).exp();
-    record(&folder, "log.csv", 1.1, rises_and_falls, 5);
+    let bump = |x: f64, _: f64, _: f64| 8.0 * (-((x - 0.3) / 0.15).powi(2)).exp();
+    record(&folder, "log.csv", 1.1, bump, 5);
     let said = explained(&folder, "log.csv");
     let effect = &said["effects"][0];
     assert_eq!(effect["effect"], "law", "{}", said["summary"]);
     assert_eq!(
         (&effect["enters"], &effect["depends"][0]),
-        (&"v".into(), &"v".into())
+        (&"v".into(), &"x".into())
     );
     assert!(
         effect["equation"].as_str().unwrap().contains("exp("),
         "{effect}"
     );
     let width = effect["parameters"]["formula_s"]["value"].as_f64().unwrap();
-    assert!((width - 1.5).abs() < 0.1, "{width}");
+    assert!((width - 0.15).abs() < 0.01, "{width}");
     let (place, variable, share) = strongest(&said);
-    assert_eq!((place.as_str(), variable.as_str()), ("equation of v", "v"));
+    assert_eq!((place.as_str(), variable.as_str()), ("equation of v", "x"));
     let significant = said["where"]["equations"]["significant"].as_f64().unwrap();
     assert!(share > significant, "{share} {significant}");
     let page = std::fs::read_to_string(folder.join("e.html")).unwrap();

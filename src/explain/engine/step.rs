@@ -342,15 +342,18 @@ pub(super) fn step(stage: &Stage) -> Step {
         options,
     };
     fitted.extend(trials(&scope.hypotheses, open, &ground));
+    // A formula says in two or three numbers what a curve says in nine. Of equals the curve stays: it is level beyond its ends.
+    let best = fitted.iter().map(|f| f.gain).fold(0.0, f64::max);
+    let curve = fitted
+        .iter()
+        .find(|f| f.lead.curve.is_some() && f.gain > (1.0 - TIE.1) * best);
+    if let (Some(curve), Some((screen, _))) = (curve, tried.first()) {
+        let mut better = formulas(curve, &screen.arguments, &ground);
+        better.retain(|f| f.gain > curve.gain + TIE.0);
+        fitted.extend(better);
+    }
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     order(&plant.spec, &mut fitted);
-    // A formula says in two or three numbers what a curve says in nine. Of equals the curve stays: it is level beyond its ends.
-    if let (Some(best), Some((screen, _))) = (fitted.first(), tried.first()) {
-        let mut better = formulas(best, &screen.arguments, &ground);
-        better.retain(|f| f.gain > best.gain + TIE.0);
-        better.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        fitted.splice(0..0, better);
-    }
     Step {
         fitted,
         strongest,
