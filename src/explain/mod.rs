@@ -78,9 +78,9 @@ mod weak;
 mod words;
 
 pub use augmented::AugmentedError;
-pub use engine::documentation::{Imitation, PLANT_EFFECTS, PlantEffect, plant_effect};
 pub use engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
 pub use engine::scope::UnknownPlantEffect;
+pub use engine::terms::documentation::{Imitation, PLANT_EFFECTS, PlantEffect, plant_effect};
 pub use error::ExplainError;
 pub use explanation::{
     Alternative, AugmentedModel, AugmentedPlant, Curve, Detectable, EXPLANATION_FORMAT,

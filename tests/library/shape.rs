@@ -8,12 +8,7 @@ use std::path::{Path, PathBuf};
 /// Files in a folder, subfolders apart, so that its listing is read at a glance.
 const MOST_FILES: usize = 12;
 /// Folders of `src/` that hold more. This list and those below only become shorter.
-const CROWDED: [&str; 4] = [
-    "explain",
-    "explain/effects",
-    "explain/engine",
-    "physics/simulation",
-];
+const CROWDED: [&str; 3] = ["explain", "explain/effects", "physics/simulation"];
 /// Folders of `src/` in which names of files are repeated, in them or outside.
 const REPEATING: [&str; 2] = ["explain", "physics"];
 /// Modules that are not looked at for circles between their files.

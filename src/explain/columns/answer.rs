@@ -2,7 +2,7 @@
 
 use super::{Question, USEFUL, reproduce};
 use crate::explain::check::Checked;
-use crate::explain::engine::documentation::plant_effect;
+use crate::explain::engine::terms::documentation::plant_effect;
 use crate::explain::explanation::Explanation;
 use crate::explain::plant_answer::{PlantOptions, explain_plant};
 use crate::explain::simulation::Simulation;

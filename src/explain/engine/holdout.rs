@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::thresholds::MOST_STEPS;
+use crate::explain::engine::thresholds::MOST_STEPS;
 use crate::noise::Series;
 use crate::physics::estimate::{Effort, EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, Plant};

@@ -1,26 +1,15 @@
 //! What a plant in equations leaves out: one engine over places, terms and arguments.
+//!
+//! `select` asks `search` for effects, by the likelihood and by free runs, and judges by `holdout`. A search takes one `step`
+//! after the other: `screening` tests `terms` at places, `fitting` fits what the tests find.
 
-pub(crate) mod argument;
-pub(crate) mod candidate;
-pub(crate) mod curve;
-pub(crate) mod documentation;
-pub(crate) mod edit;
-mod eliminate;
-mod finish;
-pub(crate) mod fitted;
-mod formulas;
+pub(crate) mod fitting;
 pub(crate) mod holdout;
 pub(crate) mod hypothesis;
-pub(crate) mod library;
-mod map;
-pub(crate) mod names;
-mod path;
-mod projection;
 pub(crate) mod scope;
-pub(crate) mod screen;
+pub(crate) mod screening;
 pub(crate) mod search;
-mod second_effect;
 pub(crate) mod select;
 mod step;
+pub(crate) mod terms;
 pub(crate) mod thresholds;
-pub(crate) mod values;

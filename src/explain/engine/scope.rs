@@ -1,9 +1,9 @@
 //! Which effects of the library may be named, and what is asked beside them.
 
-use super::documentation::PLANT_EFFECTS;
-use super::hypothesis::Hypothesis;
-use super::names::called;
-use super::screen::{Lead, Screen};
+use crate::explain::engine::hypothesis::Hypothesis;
+use crate::explain::engine::screening::screen::{Lead, Screen};
+use crate::explain::engine::terms::documentation::PLANT_EFFECTS;
+use crate::explain::engine::terms::names::called;
 use crate::physics::{ModelSpec, nearest};
 
 /// Part of the library, and hypotheses.

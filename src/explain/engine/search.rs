@@ -2,16 +2,16 @@
 
 use rayon::prelude::*;
 
-use super::eliminate::alone;
-use super::fitted::{Fitted, TIE, with_more};
-use super::holdout::{EXPLAINED, Estimator, HeldOut, held_out};
-use super::hypothesis::Trial;
-use super::library::Needs;
-use super::names::named;
-use super::scope::Scope;
-use super::second_effect::{determined, differs};
-use super::step::{Stage, Step, improved, step};
-use super::thresholds::{BETTER_FITS, FINISHED, MOST, NEEDED, SECOND};
+use crate::explain::engine::fitting::eliminate::alone;
+use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
+use crate::explain::engine::fitting::second_effect::{determined, differs};
+use crate::explain::engine::holdout::{EXPLAINED, Estimator, HeldOut, held_out};
+use crate::explain::engine::hypothesis::Trial;
+use crate::explain::engine::scope::Scope;
+use crate::explain::engine::step::{Stage, Step, improved, step};
+use crate::explain::engine::terms::library::Needs;
+use crate::explain::engine::terms::names::named;
+use crate::explain::engine::thresholds::{BETTER_FITS, FINISHED, MOST, NEEDED, SECOND};
 use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{EstimateError, EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, Plant};

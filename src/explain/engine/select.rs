@@ -7,11 +7,13 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::holdout::{EXPLAINED, Estimator, HeldOut, all_free, as_given, free_run_error, held_out};
-use super::names::named;
-use super::scope::Scope;
-use super::search::{Found, Objective, search};
-use super::thresholds::{MOST_STEPS, SECOND, chance};
+use crate::explain::engine::holdout::{
+    EXPLAINED, Estimator, HeldOut, all_free, as_given, free_run_error, held_out,
+};
+use crate::explain::engine::scope::Scope;
+use crate::explain::engine::search::{Found, Objective, search};
+use crate::explain::engine::terms::names::named;
+use crate::explain::engine::thresholds::{MOST_STEPS, SECOND, chance};
 use crate::physics::estimate::{EstimateError, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, Plant};
 

@@ -2,17 +2,17 @@
 
 use rayon::prelude::*;
 
-use super::candidate::{Candidate, candidate};
-use super::edit::Place;
-use super::finish::finished;
-use super::fitted::{Fitted, TIE, order, searched, with_more};
-use super::formulas::formulas;
-use super::hypothesis::{Ground, trials};
-use super::names::{SPECIFIC, named, rank_of};
-use super::scope::Scope;
-use super::screen::{Lead, Screen, screen};
-use super::second_effect::drop_alike;
-use super::thresholds::{
+use crate::explain::engine::fitting::candidate::{Candidate, candidate};
+use crate::explain::engine::fitting::edit::Place;
+use crate::explain::engine::fitting::finish::finished;
+use crate::explain::engine::fitting::fitted::{Fitted, TIE, order, searched, with_more};
+use crate::explain::engine::fitting::formulas::formulas;
+use crate::explain::engine::fitting::second_effect::drop_alike;
+use crate::explain::engine::hypothesis::{Ground, trials};
+use crate::explain::engine::scope::Scope;
+use crate::explain::engine::screening::screen::{Lead, Screen, screen};
+use crate::explain::engine::terms::names::{SPECIFIC, named, rank_of};
+use crate::explain::engine::thresholds::{
     AT_A_PLACE, BETTER, COMPARED, FINISHED, FITTED, FORETOLD, GLANCE, GLANCED, GLANCED_ACCURACY,
     GLANCED_STEPS, IMITATED, LEFT, MOST, MOST_STEPS, NEEDED, OF_A_KIND, THOROUGH, chance,
 };

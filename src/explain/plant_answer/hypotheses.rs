@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{Answer, figure};
-use crate::explain::engine::fitted::{Fitted, TIE, with_more};
+use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
 use crate::explain::engine::hypothesis::{Hypothesis, Trial};
 use crate::explain::engine::thresholds::{NEEDED, SURE};
 use crate::explain::explanation::{
@@ -22,7 +22,7 @@ impl Answer<'_> {
     pub(super) fn called(&self, spec: &ModelSpec, fitted: &Fitted) -> String {
         match fitted.hypothesis.and_then(|i| self.hypotheses.get(i)) {
             Some(hypothesis) => hypothesis.name().to_owned(),
-            None => crate::explain::engine::names::named(spec, fitted).to_owned(),
+            None => crate::explain::engine::terms::names::named(spec, fitted).to_owned(),
         }
     }
 

@@ -9,13 +9,13 @@ pub use question::{PlantOptions, PlantQuestionError};
 pub use simulate::{AugmentedPlantError, Original};
 
 use super::answer::extremes;
-use super::engine::fitted::Fitted;
+use super::engine::fitting::fitted::Fitted;
 use super::engine::holdout::{EXPLAINED, HeldOut, blocks};
 use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
-use super::engine::library::Port;
 use super::engine::scope::Scope;
 use super::engine::search::Found;
 use super::engine::select::{CHANCE, select};
+use super::engine::terms::library::Port;
 use super::engine::thresholds::{LEFT, SURE, chance};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,

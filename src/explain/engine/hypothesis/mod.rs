@@ -20,7 +20,7 @@ pub use error::{HypothesisError, HypothesisErrorKind};
 pub(crate) use trial::{Ground, Trial, prefer_asked, trials};
 
 use self::place::Target;
-use super::edit::{Edit, NewParameter};
+use super::fitting::edit::{Edit, NewParameter};
 use crate::physics::{
     ModelSpec, Span, SpecErrorKind, Token, Unit, VariableKind, function_names, is_reserved,
     nearest, parse, tokens,

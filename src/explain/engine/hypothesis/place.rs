@@ -1,8 +1,8 @@
 //! Where a hypothesis enters, and the plant with it.
 
-use super::super::candidate::{Candidate, equation_text, free_name};
-use super::super::edit::{Edit, Place, literal, sections};
 use super::{Change, Hypothesis, HypothesisErrorKind as Kind};
+use crate::explain::engine::fitting::candidate::{Candidate, equation_text, free_name};
+use crate::explain::engine::fitting::edit::{Edit, Place, literal, sections};
 use crate::physics::{
     Equation, ExpressionId, ModelSpec, Node, Span, SpecErrorKind, Token, Unknown, VariableId,
     VariableKind, nearest, parse, tokens,

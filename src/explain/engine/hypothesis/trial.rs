@@ -4,11 +4,11 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::{Change, Hypothesis, NewNumber};
-use crate::explain::engine::candidate::Candidate;
-use crate::explain::engine::edit::{Edit, Place, literal, sensors};
-use crate::explain::engine::fitted::{Fitted, TIE, with_more};
-use crate::explain::engine::library::{Needs, Port, Term};
-use crate::explain::engine::screen::Lead;
+use crate::explain::engine::fitting::candidate::Candidate;
+use crate::explain::engine::fitting::edit::{Edit, Place, literal, sensors};
+use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
+use crate::explain::engine::screening::screen::Lead;
+use crate::explain::engine::terms::library::{Needs, Port, Term};
 use crate::explain::engine::thresholds::{GLANCE, NEEDED, ROUNDS, SECOND, SURE, THOROUGH};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Plant, VariableKind};

@@ -2,12 +2,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::argument::{Argument, ArgumentForm};
-use super::edit::{Place, literal};
-use super::library::{CURVE, Port};
-use super::path::{Hooked, Path};
-use super::projection::Projection;
-use super::screen::Lead;
+use crate::explain::engine::fitting::edit::{Place, literal};
+use crate::explain::engine::screening::path::{Hooked, Path};
+use crate::explain::engine::screening::projection::Projection;
+use crate::explain::engine::screening::screen::Lead;
+use crate::explain::engine::terms::argument::{Argument, ArgumentForm};
+use crate::explain::engine::terms::library::{CURVE, Port};
 
 /// Knots of a curve: half of them at quantiles, half at equal distances.
 const KNOTS: usize = 9;
@@ -74,7 +74,7 @@ impl Curve {
 }
 
 /// Curves at the places and of the arguments of the best terms.
-pub(super) fn curves(
+pub(in crate::explain::engine) fn curves(
     leads: &[Lead],
     arguments: &[Argument],
     hooked: &Hooked,

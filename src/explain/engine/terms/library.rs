@@ -102,7 +102,7 @@ pub(crate) struct Shape {
 /// A term.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Term {
-    /// Id where nothing more is known of the place; see [`named`](super::names::named).
+    /// Id where nothing more is known of the place; see [`named`](crate::explain::engine::terms::names::named).
     pub(crate) id: &'static str,
     pub(crate) port: Port,
     pub(crate) needs: Needs,
@@ -119,7 +119,11 @@ pub(crate) struct Term {
     pub(crate) units: &'static [&'static str],
 }
 
-pub(super) const fn shape(symbol: &'static str, starts: Starts, positive: bool) -> Shape {
+pub(in crate::explain::engine) const fn shape(
+    symbol: &'static str,
+    starts: Starts,
+    positive: bool,
+) -> Shape {
     Shape {
         symbol,
         starts,
@@ -127,7 +131,7 @@ pub(super) const fn shape(symbol: &'static str, starts: Starts, positive: bool) 
     }
 }
 
-pub(super) const fn curve(
+pub(in crate::explain::engine) const fn curve(
     id: &'static str,
     port: Port,
     needs: Needs,

@@ -1,10 +1,10 @@
 //! A lead made into a plant that can be fitted.
 
-use super::argument::Argument;
-use super::edit::{Edit, NewParameter, Place, acting, literal};
-use super::library::{Port, Starts};
-use super::screen::Lead;
-use super::values::filled;
+use crate::explain::engine::fitting::edit::{Edit, NewParameter, Place, acting, literal};
+use crate::explain::engine::screening::screen::Lead;
+use crate::explain::engine::terms::argument::Argument;
+use crate::explain::engine::terms::library::{Port, Starts};
+use crate::explain::engine::terms::values::filled;
 use crate::physics::estimate::{Fit, Form, PlantRecording};
 use crate::physics::{ModelSpec, Plant};
 
@@ -32,7 +32,7 @@ pub(crate) struct Candidate {
 }
 
 /// A name that the plant does not have.
-pub(super) fn free_name(spec: &ModelSpec, wanted: &str) -> String {
+pub(in crate::explain::engine) fn free_name(spec: &ModelSpec, wanted: &str) -> String {
     let mut name = wanted.to_owned();
     let mut n = 1;
     while spec.find(&name).is_some() || spec.find(&format!("{name}_acting")).is_some() {
@@ -173,7 +173,11 @@ pub(crate) fn candidate(
 }
 
 /// The changed equation as it stands in the new text.
-pub(super) fn equation_text(changed: &ModelSpec, spec: &ModelSpec, place: Place) -> String {
+pub(in crate::explain::engine) fn equation_text(
+    changed: &ModelSpec,
+    spec: &ModelSpec,
+    place: Place,
+) -> String {
     let variable = place.variable(spec);
     let name = match place {
         Place::Equation(_) => spec.variable(variable).name.clone(),
@@ -218,11 +222,11 @@ impl Candidate {
 mod tests {
     use std::collections::BTreeSet;
 
-    use super::super::argument::arguments;
-    use super::super::edit::{places, sensors};
-    use super::super::library::{Needs, TERMS};
-    use super::super::values::grid;
     use super::*;
+    use crate::explain::engine::fitting::edit::{places, sensors};
+    use crate::explain::engine::terms::argument::arguments;
+    use crate::explain::engine::terms::library::{Needs, TERMS};
+    use crate::explain::engine::terms::values::grid;
     use crate::physics::parse;
 
     #[test]

@@ -2,9 +2,9 @@
 
 use crate::physics::{Binary, Equation, ModelSpec, Node, Unknown, VariableId, VariableKind};
 
-use super::edit::{Place, user_of};
-use super::fitted::Fitted;
-use super::library::{Needs, Port, Term};
+use crate::explain::engine::fitting::edit::{Place, user_of};
+use crate::explain::engine::fitting::fitted::Fitted;
+use crate::explain::engine::terms::library::{Needs, Port, Term};
 
 /// What kind of quantity an argument is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,7 +57,7 @@ fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
 }
 
 /// Whether no variable of a plant has a unit.
-pub(super) fn is_without_units(spec: &ModelSpec) -> bool {
+pub(in crate::explain::engine) fn is_without_units(spec: &ModelSpec) -> bool {
     spec.variables.iter().all(|v| v.unit_text.is_none())
 }
 
@@ -67,17 +67,20 @@ fn slows(term: &Term) -> bool {
 }
 
 /// Whether these may be velocities.
-pub(super) fn may_be_velocity(spec: &ModelSpec, variables: &[VariableId]) -> bool {
+pub(in crate::explain::engine) fn may_be_velocity(
+    spec: &ModelSpec,
+    variables: &[VariableId],
+) -> bool {
     matches!(kind(spec, variables), Kind::Velocity | Kind::Unknown)
 }
 
 /// Whether these may be angles.
-pub(super) fn may_be_angle(spec: &ModelSpec, variables: &[VariableId]) -> bool {
+pub(in crate::explain::engine) fn may_be_angle(spec: &ModelSpec, variables: &[VariableId]) -> bool {
     is_without_units(spec) && kind(spec, variables) == Kind::Position
 }
 
 /// Whether all of these are velocities.
-pub(super) fn is_velocity(spec: &ModelSpec, variables: &[VariableId]) -> bool {
+pub(in crate::explain::engine) fn is_velocity(spec: &ModelSpec, variables: &[VariableId]) -> bool {
     kind(spec, variables) == Kind::Velocity
 }
 
@@ -137,7 +140,7 @@ pub(crate) fn family(id: &str) -> &str {
 }
 
 /// The special case of a form that has a name too.
-pub(super) fn special_case(id: &str) -> Option<&'static str> {
+pub(in crate::explain::engine) fn special_case(id: &str) -> Option<&'static str> {
     (id == "stribeck_friction").then_some("coulomb_friction")
 }
 
@@ -251,7 +254,11 @@ pub(crate) fn called(
 
 /// Whether a parameter without a unit may be a resistance that its own current heats: it damps the state of its equation, and
 /// the heat is that of this state.
-pub(super) fn heats_itself(spec: &ModelSpec, parameter: VariableId, heat: &[VariableId]) -> bool {
+pub(in crate::explain::engine) fn heats_itself(
+    spec: &ModelSpec,
+    parameter: VariableId,
+    heat: &[VariableId],
+) -> bool {
     let [state] = *heat else { return false };
     let damping = |node: &Node| match *node {
         Node::Binary(Binary::Multiply, a, b) => {
@@ -283,10 +290,15 @@ pub(crate) fn name_rank(spec: &ModelSpec, found: &Fitted) -> u8 {
 const PLACES: u8 = 4;
 
 /// Ranks below this are names of their own.
-pub(super) const SPECIFIC: u8 = PLACES;
+pub(in crate::explain::engine) const SPECIFIC: u8 = PLACES;
 
 /// The rank of a term at a place, as a function of variables.
-pub(super) fn rank_of(spec: &ModelSpec, term: &Term, place: Place, variables: &[VariableId]) -> u8 {
+pub(in crate::explain::engine) fn rank_of(
+    spec: &ModelSpec,
+    term: &Term,
+    place: Place,
+    variables: &[VariableId],
+) -> u8 {
     let (of_place, elsewhere) = match place {
         Place::Equation(at) => {
             let own = place.variable(spec);
@@ -316,8 +328,8 @@ pub(super) fn rank_of(spec: &ModelSpec, term: &Term, place: Place, variables: &[
 
 #[cfg(test)]
 mod tests {
-    use super::super::library::TERMS;
     use super::*;
+    use crate::explain::engine::terms::library::TERMS;
     use crate::physics::parse;
 
     fn name(text: &str, term: &str, at: &str, of: &str) -> &'static str {

@@ -1,8 +1,8 @@
 //! Values of terms along recordings, from the text of the terms.
 
-use super::argument::Argument;
-use super::edit::literal;
-use super::library::{MEMORIES, MemoryStart, Starts, Term};
+use crate::explain::engine::fitting::edit::literal;
+use crate::explain::engine::terms::argument::Argument;
+use crate::explain::engine::terms::library::{MEMORIES, MemoryStart, Starts, Term};
 use crate::physics::estimate::PlantRecording;
 use crate::physics::{Excitation, Hold, Plant, parse};
 
@@ -48,7 +48,7 @@ fn starts(
 }
 
 /// The combinations of start values of all shapes; `peaks` are frequencies in rad/s.
-pub(super) fn grid(
+pub(in crate::explain::engine) fn grid(
     term: &Term,
     argument: Option<&Argument>,
     recordings: &[PlantRecording],
@@ -98,14 +98,14 @@ pub(crate) fn filled(
 }
 
 /// A term at an argument with shapes, whose values are asked for.
-pub(super) struct Instance {
-    pub(super) term: &'static Term,
-    pub(super) argument: Option<usize>,
-    pub(super) shapes: Vec<f64>,
+pub(in crate::explain::engine) struct Instance {
+    pub(in crate::explain::engine) term: &'static Term,
+    pub(in crate::explain::engine) argument: Option<usize>,
+    pub(in crate::explain::engine) shapes: Vec<f64>,
 }
 
 /// Values of terms along the recordings.
-pub(super) fn evaluate(
+pub(in crate::explain::engine) fn evaluate(
     instances: &[Instance],
     arguments: &[Argument],
     recordings: &[PlantRecording],

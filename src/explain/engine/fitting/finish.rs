@@ -2,15 +2,15 @@
 
 use rayon::prelude::*;
 
-use super::fitted::{Fitted, searched, with_more};
-use super::names::{SPECIFIC, rank};
-use super::thresholds::{FINISHED, MOST_STEPS, ROUNDS, THOROUGH};
+use crate::explain::engine::fitting::fitted::{Fitted, searched, with_more};
+use crate::explain::engine::terms::names::{SPECIFIC, rank};
+use crate::explain::engine::thresholds::{FINISHED, MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 
 /// Names that gain this part of the best are finished too.
 const HALF: f64 = 0.5;
 /// The best of all fits, fitted until nothing changes; the others as they are. Best first.
-pub(super) fn finished(
+pub(in crate::explain::engine) fn finished(
     mut fitted: Vec<Fitted>,
     study: &Study,
     before: &Fit,

@@ -3,15 +3,15 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::argument::Argument;
-use super::candidate::candidate;
-use super::curve::piece;
-use super::fitted::{Fitted, searched, with_more};
-use super::hypothesis::Ground;
-use super::library::{Needs, Port, Starts, Term, curve, shape};
-use super::screen::Lead;
-use super::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
-use super::values::{Instance, evaluate, grid};
+use crate::explain::engine::fitting::candidate::candidate;
+use crate::explain::engine::fitting::fitted::{Fitted, searched, with_more};
+use crate::explain::engine::hypothesis::Ground;
+use crate::explain::engine::screening::curve::piece;
+use crate::explain::engine::screening::screen::Lead;
+use crate::explain::engine::terms::argument::Argument;
+use crate::explain::engine::terms::library::{Needs, Port, Starts, Term, curve, shape};
+use crate::explain::engine::terms::values::{Instance, evaluate, grid};
+use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::Fit;
 
 const WIDTHS: Starts = Starts::Spread(&[0.1, 0.2, 0.5, 1.0, 2.0]);
@@ -40,7 +40,10 @@ const FORMULAS: &[Term] = &[
 /// Formulas that are fitted to the recording: those nearest to the curve.
 const FITTED: usize = 3;
 
-const fn law(form: &'static str, shapes: &'static [super::library::Shape]) -> Term {
+const fn law(
+    form: &'static str,
+    shapes: &'static [crate::explain::engine::terms::library::Shape],
+) -> Term {
     curve("formula", Port::Equation, Needs::Anything, form, shapes)
 }
 
@@ -54,7 +57,11 @@ struct Near {
 }
 
 /// The formulas near to the curve of a fit, fitted in its place; none where it is no curve.
-pub(super) fn formulas(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Vec<Fitted> {
+pub(in crate::explain::engine) fn formulas(
+    best: &Fitted,
+    arguments: &[Argument],
+    ground: &Ground,
+) -> Vec<Fitted> {
     let nearest = nearest(best, arguments, ground).unwrap_or_default();
     nearest
         .par_iter()

@@ -3,14 +3,14 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::argument::Argument;
-use super::edit::{Edit, Place, places};
+use crate::explain::engine::fitting::edit::{Edit, Place, places};
+use crate::explain::engine::terms::argument::Argument;
 use crate::noise::Series;
 use crate::physics::estimate::{Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Plant};
 
 /// The plant along its predictions.
-pub(super) struct Path {
+pub(in crate::explain::engine) struct Path {
     /// From sample to sample, for each recording.
     phi: Vec<Vec<DMatrix<f64>>>,
     gamma: Vec<Vec<DMatrix<f64>>>,
@@ -19,14 +19,14 @@ pub(super) struct Path {
 }
 
 /// Places with the columns of the hooks that enter there.
-pub(super) struct Hooked {
+pub(in crate::explain::engine) struct Hooked {
     plant: Plant,
-    pub(super) places: Vec<Place>,
+    pub(in crate::explain::engine) places: Vec<Place>,
     /// Input of the hooked plant for each place.
-    pub(super) columns: Vec<usize>,
+    pub(in crate::explain::engine) columns: Vec<usize>,
 }
 
-pub(super) fn hooked(
+pub(in crate::explain::engine) fn hooked(
     spec: &ModelSpec,
     given: &ModelSpec,
     arguments: &[Argument],
@@ -60,7 +60,7 @@ pub(super) fn hooked(
 }
 
 /// Linearises along the predictions, and fills in the values of the arguments.
-pub(super) fn path(
+pub(in crate::explain::engine) fn path(
     study: &Study,
     fit: &Fit,
     hooked: &Hooked,

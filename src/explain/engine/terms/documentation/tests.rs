@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 
 use super::*;
-use crate::explain::engine::argument::{ArgumentForm, arguments};
-use crate::explain::engine::edit::{Place, places, sensors};
-use crate::explain::engine::library::{Needs, Port, TERMS};
-use crate::explain::engine::names::called;
+use crate::explain::engine::fitting::edit::{Place, places, sensors};
+use crate::explain::engine::terms::argument::{ArgumentForm, arguments};
+use crate::explain::engine::terms::library::{Needs, Port, TERMS};
+use crate::explain::engine::terms::names::called;
 use crate::physics::parse;
 
 /// Plants that between them have every kind of place and argument that a name depends on.

@@ -10,10 +10,10 @@ use crate::physics::estimate::{Fit, Study};
 /// A column of which less than this is left after projection is what parameters can do, but for rounding.
 const LEAST_LEFT: f64 = 0.02;
 /// Numbers in a signature.
-pub(super) const SIGNATURE: usize = 8;
+pub(in crate::explain::engine) const SIGNATURE: usize = 8;
 
 /// What the regression of the residual on terms needs.
-pub(super) struct Projection {
+pub(in crate::explain::engine) struct Projection {
     q: DMatrix<f64>,
     /// What a product with `q` says of the numbers of the fit, a row for each.
     numbers: DMatrix<f64>,
@@ -24,7 +24,7 @@ pub(super) struct Projection {
 }
 
 /// What a test says.
-pub(super) struct Tested {
+pub(in crate::explain::engine) struct Tested {
     pub statistic: f64,
     pub strength: f64,
     /// What the regression adds to each number of the fit beside the term.
@@ -75,7 +75,7 @@ impl Projection {
     }
 
     /// Projects parameters and initial states off; the products with their directions.
-    pub(super) fn off(&self, column: &mut [f64]) -> DVector<f64> {
+    pub(in crate::explain::engine) fn off(&self, column: &mut [f64]) -> DVector<f64> {
         let products = self.q.column_iter().map(|q| {
             let along: f64 = q.iter().zip(column.iter()).map(|(q, c)| q * c).sum();
             column
@@ -88,7 +88,7 @@ impl Projection {
     }
 
     /// What the regression adds to each number of the fit beside a term whose column had these products.
-    pub(super) fn shift(&self, products: &DVector<f64>) -> Vec<f64> {
+    pub(in crate::explain::engine) fn shift(&self, products: &DVector<f64>) -> Vec<f64> {
         let of_inside = &self.numbers * products;
         let mut shift = vec![0.0; self.count];
         for (&i, s) in self.inside.iter().zip(&of_inside) {

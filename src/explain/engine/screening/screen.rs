@@ -6,16 +6,16 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::argument::{Argument, ArgumentForm, arguments};
-use super::curve::{Curve, curves};
-use super::edit::{Place, enters_several, is_of, sensors};
-use super::library::{Needs, Port, Starts, TERMS, Term};
-use super::map::map;
-use super::names::{heats_itself, is_without_units, rank_of};
-use super::path::{Hooked, Path, hooked, path};
-use super::projection::{Projection, SIGNATURE};
-use super::thresholds::significant;
-use super::values::{Instance, evaluate, grid};
+use crate::explain::engine::fitting::edit::{Place, enters_several, is_of, sensors};
+use crate::explain::engine::screening::curve::{Curve, curves};
+use crate::explain::engine::screening::map::map;
+use crate::explain::engine::screening::path::{Hooked, Path, hooked, path};
+use crate::explain::engine::screening::projection::{Projection, SIGNATURE};
+use crate::explain::engine::terms::argument::{Argument, ArgumentForm, arguments};
+use crate::explain::engine::terms::library::{Needs, Port, Starts, TERMS, Term};
+use crate::explain::engine::terms::names::{heats_itself, is_without_units, rank_of};
+use crate::explain::engine::terms::values::{Instance, evaluate, grid};
+use crate::explain::engine::thresholds::significant;
 use crate::explain::explanation::EquationMap;
 use crate::explain::locate::spectrum;
 use crate::noise::Series;
@@ -60,7 +60,7 @@ pub(crate) struct Lead {
 
 impl Lead {
     /// A term at a place that no test has looked at.
-    pub(super) fn untested(term: &'static Term, place: Place) -> Self {
+    pub(in crate::explain::engine) fn untested(term: &'static Term, place: Place) -> Self {
         Self {
             term,
             place,
@@ -76,7 +76,12 @@ impl Lead {
     }
 
     /// The same at a place of another text.
-    pub(super) fn at(self, place: Place, argument: Option<usize>, shapes: &[f64]) -> Self {
+    pub(in crate::explain::engine) fn at(
+        self,
+        place: Place,
+        argument: Option<usize>,
+        shapes: &[f64],
+    ) -> Self {
         Self {
             place,
             argument,

@@ -1,9 +1,9 @@
 //! What may be named beside an effect that was found.
 
-use super::fitted::{Fitted, with_more};
-use super::library::Port;
-use super::names::{called, family};
-use super::screen::{Lead, Screen};
+use crate::explain::engine::fitting::fitted::{Fitted, with_more};
+use crate::explain::engine::screening::screen::{Lead, Screen};
+use crate::explain::engine::terms::library::Port;
+use crate::explain::engine::terms::names::{called, family};
 use crate::physics::ModelSpec;
 use crate::physics::estimate::{EstimateOptions, Study};
 
@@ -14,7 +14,7 @@ const DETERMINED: f64 = 3.3;
 /// Whether a term may be named beside an effect. It must have a name of its own: a function without a name may be what is left of
 /// the first; and it must not be a function of the same variables at the same kind of place, which may be the part that the
 /// formula of the first leaves (math/physics.md, "Fits and decision", 8).
-pub(super) fn differs(
+pub(in crate::explain::engine) fn differs(
     id: &str,
     port: Port,
     depends: &[String],
@@ -32,7 +32,11 @@ pub(super) fn differs(
 }
 
 /// Whether the strength of a term differs from 0 by more than the parameters leave open.
-pub(super) fn determined(study: &Study, found: &Fitted, options: &EstimateOptions) -> bool {
+pub(in crate::explain::engine) fn determined(
+    study: &Study,
+    found: &Fitted,
+    options: &EstimateOptions,
+) -> bool {
     if !found.lead.term.free_strength {
         return true;
     }
@@ -46,7 +50,11 @@ pub(super) fn determined(study: &Study, found: &Fitted, options: &EstimateOption
 
 /// Drops what may not be named beside an effect, but for the best term and the best curve: what these explain as well is no
 /// evidence of another.
-pub(super) fn drop_alike(screen: &mut Screen, spec: &ModelSpec, first: (&Fitted, &str)) {
+pub(in crate::explain::engine) fn drop_alike(
+    screen: &mut Screen,
+    spec: &ModelSpec,
+    first: (&Fitted, &str),
+) {
     let arguments = &screen.arguments;
     let mut taken = [false; 2];
     let mut keep = |lead: &Lead| {

@@ -3,12 +3,12 @@
 //! The first effect is the best that one term can do while the other is missing, and a flexible term can stand for both. Once
 //! the second is there the first may be of no use.
 
-use super::argument::arguments;
-use super::candidate::candidate;
-use super::edit::Place;
-use super::fitted::{Fitted, searched, with_more};
-use super::path::{hooked, path};
-use super::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
+use crate::explain::engine::fitting::candidate::candidate;
+use crate::explain::engine::fitting::edit::Place;
+use crate::explain::engine::fitting::fitted::{Fitted, searched, with_more};
+use crate::explain::engine::screening::path::{hooked, path};
+use crate::explain::engine::terms::argument::arguments;
+use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Plant};
 
@@ -29,7 +29,7 @@ fn same_place(place: Place, of: &ModelSpec, given: &ModelSpec) -> Option<Place> 
 
 /// The plant with the second of two effects alone, fitted from where the two of them ended. `study` and `baseline` are those of
 /// the plant without either.
-pub(super) fn alone(
+pub(in crate::explain::engine) fn alone(
     plant: &Plant,
     study: &Study,
     baseline: &Fit,

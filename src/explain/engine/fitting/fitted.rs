@@ -1,10 +1,10 @@
 //! Candidates that were fitted, and which of them is the answer.
 
-use super::candidate::Candidate;
-use super::hypothesis::prefer_asked;
-use super::library::Starts;
-use super::names::{name_rank, named, rank, special_case};
-use super::screen::Lead;
+use crate::explain::engine::fitting::candidate::Candidate;
+use crate::explain::engine::hypothesis::prefer_asked;
+use crate::explain::engine::screening::screen::Lead;
+use crate::explain::engine::terms::library::Starts;
+use crate::explain::engine::terms::names::{name_rank, named, rank, special_case};
 use crate::physics::ModelSpec;
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 
@@ -42,7 +42,7 @@ pub(crate) struct Fitted {
 
 impl Fitted {
     /// The gain without the [`FEW`] values that it owes most to.
-    pub(super) fn gain_without_few(
+    pub(in crate::explain::engine) fn gain_without_few(
         &self,
         study: &Study,
         before: &Fit,
@@ -69,7 +69,7 @@ impl Fitted {
 }
 
 /// Penalty for the values of a shape that were searched.
-pub(super) fn searched(lead: &Lead, recordings: &[PlantRecording]) -> f64 {
+pub(in crate::explain::engine) fn searched(lead: &Lead, recordings: &[PlantRecording]) -> f64 {
     let samples = recordings.iter().map(|r| r.outputs[0].len()).sum::<usize>() as f64;
     lead.term
         .shapes
@@ -105,7 +105,7 @@ fn prefer_special_case(spec: &ModelSpec, fitted: &mut [Fitted]) {
 }
 
 /// Puts fits in the order in which they are given as answers, from one by their gains.
-pub(super) fn order(spec: &ModelSpec, fitted: &mut [Fitted]) {
+pub(in crate::explain::engine) fn order(spec: &ModelSpec, fitted: &mut [Fitted]) {
     // Among those that explain the recording as well as the best, the one with a name of its own comes first. Of several such
     // the best, unless their gains are equal.
     if let Some((best, curve)) = fitted.first().map(|f| (f.gain, f.lead.curve.is_some())) {

@@ -2,8 +2,8 @@
 
 use crate::physics::{ModelSpec, VariableId, VariableKind};
 
-use super::library::Needs;
-use super::names::{is_velocity, may_be_angle, may_be_velocity};
+use crate::explain::engine::terms::library::Needs;
+use crate::explain::engine::terms::names::{is_velocity, may_be_angle, may_be_velocity};
 
 /// How an argument is made of variables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -115,7 +115,7 @@ fn declaration(p: &NewParameter) -> String {
 }
 
 /// Where the word `equation` and the last `end` stand.
-pub(super) fn sections(text: &str) -> Option<(usize, usize)> {
+pub(in crate::explain::engine) fn sections(text: &str) -> Option<(usize, usize)> {
     let bytes = text.as_bytes();
     let (mut at, mut equation, mut end) = (0, None, None);
     while at < bytes.len() {
@@ -286,7 +286,11 @@ pub(crate) fn places(spec: &ModelSpec, given: &ModelSpec) -> Vec<Place> {
 }
 
 /// Whether a variable is one of the plant that was given.
-pub(super) fn is_of(spec: &ModelSpec, v: VariableId, given: &ModelSpec) -> bool {
+pub(in crate::explain::engine) fn is_of(
+    spec: &ModelSpec,
+    v: VariableId,
+    given: &ModelSpec,
+) -> bool {
     given.find(&spec.variable(v).name).is_some()
 }
 

@@ -1,8 +1,8 @@
 //! Where in the equations physics is missing: for every place and every variable the strongest score test.
 
-use super::argument::Argument;
-use super::edit::Place;
-use super::screen::Lead;
+use crate::explain::engine::fitting::edit::Place;
+use crate::explain::engine::screening::screen::Lead;
+use crate::explain::engine::terms::argument::Argument;
 use crate::explain::explanation::EquationMap;
 use crate::physics::ModelSpec;
 
@@ -11,7 +11,7 @@ const TIME: &str = "time";
 
 /// The map of the tests of a screen; `values` is how many values the residual has, `significant` the statistic that chance
 /// reaches with the probability at which structure is called so.
-pub(super) fn map(
+pub(in crate::explain::engine) fn map(
     leads: &[Lead],
     spec: &ModelSpec,
     arguments: &[Argument],
@@ -64,9 +64,9 @@ fn label(place: Place, sensor: bool, spec: &ModelSpec) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::argument::arguments;
-    use super::super::library::TERMS;
     use super::*;
+    use crate::explain::engine::terms::argument::arguments;
+    use crate::explain::engine::terms::library::TERMS;
     use crate::physics::parse;
 
     #[test]
@@ -80,11 +80,10 @@ mod tests {
         let of_x = arguments.iter().position(|a| a.expression == "x");
         let lead = |id: &str, argument: Option<usize>, statistic: f64| {
             let term = TERMS.iter().find(|t| t.id == id).unwrap();
-            let lead = Lead::untested(term, Place::Equation(0));
-            Lead {
-                statistic,
-                ..lead.at(Place::Equation(0), argument, &[])
-            }
+            let mut lead =
+                Lead::untested(term, Place::Equation(0)).at(Place::Equation(0), argument, &[]);
+            lead.statistic = statistic;
+            lead
         };
         let leads = [
             lead("square", of_x, 8.0),
