@@ -120,6 +120,10 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
             "law"
         }
         ("overflow", Some(&edge)) if found.lead.term.id == "root_above" && low(edge) => "leak",
+        // A level that is exceeded throughout is no level.
+        ("overflow", Some(&edge)) if found.lead.term.id == "above" && edge <= found.range.0 => {
+            "leak"
+        }
         _ => id,
     }
 }
