@@ -112,7 +112,7 @@ fn a_report_is_a_page_and_changes_nothing_else() {
     );
     let page = fs::read_to_string(folder.join("page.html")).unwrap();
     assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>"));
-    assert!(page.contains("Nothing left to explain") && page.contains("Residuals and their past"));
+    assert!(page.contains("The residuals are white") && page.contains("Residuals and their past"));
 
     let page = folder.run(&["identify", "evil.csv", "--report", "-"]).ok();
     assert!(page.contains("u&lt;script&gt;alert(1)") && !page.contains("<script>alert"));
