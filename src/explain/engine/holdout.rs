@@ -15,6 +15,8 @@ pub(crate) const EXPLAINED: f64 = 0.5;
 /// Free runs whose errors are larger than this part of the standard deviation follow nothing: a sensor that shows a constant
 /// comes near 1.
 const FOLLOWS: f64 = 0.95;
+/// Errors of this many standard deviations and more are those of a run that leaves the recording.
+const STAYS: f64 = 10.0;
 /// Effort of a fit from that to all of the recordings.
 const AGAIN: Effort = Effort {
     iterations: 12,
@@ -63,6 +65,11 @@ impl HeldOut {
     /// Whether free runs follow the recordings clearly better than their means do.
     pub(crate) fn follows(&self) -> bool {
         ratio(&self.squares, &self.variances) < FOLLOWS
+    }
+
+    /// Whether free runs stay near the recordings, even if they do not follow them: those of an unstable plant leave them.
+    pub(super) fn stays(&self) -> bool {
+        ratio(&self.squares, &self.variances) < STAYS
     }
 }
 

@@ -63,13 +63,14 @@ pub(crate) fn select(
     let found = likely.steps[0].first().filter(|_| likely.accepted > 0);
     let little_left = found.is_some_and(|first| strongest < SECOND.1 * first.gain);
     let mut searches = vec![likely];
-    // An unstable plant does not run freely: its likelihood has no judge.
-    let judged = rivals.iter().any(|r| r.held_out.follows());
+    // An unstable plant does not run freely: its likelihood has no judge. A stable one may follow once an effect is found.
+    let mut judged = rivals.iter().any(|r| r.held_out.follows());
+    let stays = rivals.iter().any(|r| r.held_out.stays());
     let mut chosen = (0, searches[0].accepted);
     // With an observer the residuals are white wherever the observer follows: that proves no effect.
     let proved = (adequate || little_left)
         && (searches[0].accepted == 0 || searches[0].fit.form == Form::FreeRun);
-    if judged && !(holds && proved) {
+    if stays && !(judged && holds && proved) {
         let known = rivals
             .iter()
             .find(|r| r.accepted == 0 && r.estimator == Estimator::FreeRun)
@@ -79,6 +80,9 @@ pub(crate) fn select(
             rivals.extend(self::rivals(&found, 1, recordings, hold));
             searches.push(found);
         }
+        judged = rivals.iter().any(|r| r.held_out.follows());
+    }
+    if searches.len() > 1 && judged {
         // A second effect that only free runs show, beside a first that both searches find, is what the formula of the first
         // leaves.
         let most = match &searches[..] {
