@@ -126,6 +126,11 @@ fn line(text: &mut String, what: &str, says: &str) {
     text.push_str(&wrapped(&format!("  {what:<11} "), says));
 }
 
+/// The name of an effect without the comma after which a sentence goes on.
+fn title(name: &str) -> &str {
+    name.trim_end_matches(',')
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -150,9 +155,4 @@ mod tests {
         let said = effects_text(Some("quadratic_drg")).unwrap_err().to_string();
         assert!(said.contains("did you mean quadratic_drag?"), "{said}");
     }
-}
-
-/// The name of an effect without the comma after which a sentence goes on.
-fn title(name: &str) -> &str {
-    name.trim_end_matches(',')
 }
