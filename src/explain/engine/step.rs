@@ -83,15 +83,7 @@ pub(super) fn improved(stage: &Stage, fitted: &[Fitted]) -> Option<Fit> {
         .filter(|f| f.hypothesis.is_none() && f.gain > NEEDED);
     best.take(FINISHED)
         .filter(|f| f.candidate.new_states == 0)
-        .filter_map(|f| {
-            let mut point = f.fit.point.clone();
-            point.drain(first..first + f.candidate.values.len());
-            let from = Fit {
-                point,
-                ..f.fit.clone()
-            };
-            stage.study.refit(&from, 1, THOROUGH)
-        })
+        .filter_map(|f| stage.study.refit(&f.without_term(first), 1, THOROUGH))
         .filter(|again| again.criterion < stage.fit.criterion - BETTER)
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
 }

@@ -12,7 +12,6 @@ use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::{Needs, Port, Starts, Term, curve, shape};
 use crate::explain::engine::terms::values::{Instance, evaluate, grid};
 use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
-use crate::physics::estimate::Fit;
 
 const WIDTHS: Starts = Starts::Spread(&[0.1, 0.2, 0.5, 1.0, 2.0]);
 const MIDDLES: Starts = Starts::Quantiles(&[0.1, 0.3, 0.5, 0.7, 0.9]);
@@ -143,12 +142,7 @@ fn in_its_place(
     let limited = made.plant.clone().with_most_steps(MOST_STEPS);
     let inner = study.of(&limited, &options).ok()?;
     let parameters = study.parameters();
-    let mut point = best.fit.point.clone();
-    point.drain(parameters..parameters + best.candidate.values.len());
-    let without = Fit {
-        point,
-        ..best.fit.clone()
-    };
+    let without = best.without_term(parameters);
     let states = plant.spec.states().len();
     let start = made.from(&without, parameters, states, study.outputs());
     let fit = inner.refit(&start, ROUNDS, THOROUGH)?;
