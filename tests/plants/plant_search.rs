@@ -1,5 +1,5 @@
-//! How what is missing is found in a plant in equations: instants, formulas, the map over the equations, and plants whose free
-//! run strays from the recording. Recordings are those of integrators of the tests' own.
+//! How what is missing is found in a plant in equations: instants, formulas, the map over the equations, and a store that is
+//! shaken. Recordings are those of integrators of the tests' own.
 
 use std::fmt::Write;
 
@@ -89,7 +89,7 @@ end Store;
 "#;
 
 #[test]
-fn an_overflow_is_found_where_the_free_run_strays() {
+fn an_overflow_is_found_beside_what_nobody_measures() {
     let folder = Folder::new();
     folder.text("store.mo", STORE);
     let mut dice = ChaCha8Rng::seed_from_u64(11);
