@@ -1,5 +1,7 @@
 //! The deviance of the recordings in one form, with its derivatives.
 
+use std::rc::Rc;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::Form;
@@ -11,8 +13,7 @@ use crate::physics::simulated::Run;
 use crate::physics::simulation::{Direction, Observer, Plan, Point, Trajectory};
 
 /// Runs of all recordings at a point.
-#[derive(Clone)]
-pub(super) struct Runs {
+struct Runs {
     at: Vec<f64>,
     plans: Vec<Plan>,
     states: Vec<Series>,
@@ -59,8 +60,9 @@ pub(super) struct Deviance<'p, 'a> {
     /// True when the gain of the observer stays as it is: its derivatives are not computed.
     pub(super) gain_held: bool,
     pub(super) slopes: Slopes,
-    last: Option<Runs>,
-    accepted: Option<Runs>,
+    /// The last runs, and those at which derivatives were computed last: a search returns to these.
+    last: Option<Rc<Runs>>,
+    base: Option<Rc<Runs>>,
 }
 
 impl<'p, 'a> Deviance<'p, 'a> {
@@ -72,7 +74,7 @@ impl<'p, 'a> Deviance<'p, 'a> {
             gain_held: false,
             slopes: Slopes::FrozenFirst,
             last: None,
-            accepted: None,
+            base: None,
         }
     }
 
@@ -89,7 +91,7 @@ impl<'p, 'a> Deviance<'p, 'a> {
         problem.plant.run(&runs).ok()
     }
 
-    pub(super) fn run(&self, point: &[f64]) -> Option<Runs> {
+    fn run(&self, point: &[f64]) -> Option<Runs> {
         let trajectories = self.runs(point)?;
         let mut residual = Series::new();
         for (r, t) in self.problem.recordings.iter().zip(&trajectories) {
@@ -111,6 +113,18 @@ impl<'p, 'a> Deviance<'p, 'a> {
         })
     }
 
+    /// Runs at a point, which the noise model does not change.
+    fn at(&mut self, point: &[f64]) -> Option<Rc<Runs>> {
+        for known in [&self.last, &self.base].into_iter().flatten() {
+            if known.at == point {
+                return Some(Rc::clone(known));
+            }
+        }
+        let runs = Rc::new(self.run(point)?);
+        self.last = Some(Rc::clone(&runs));
+        Some(runs)
+    }
+
     /// Outputs at a point.
     pub(crate) fn simulated(&self, point: &[f64]) -> Option<Series> {
         Some(
@@ -122,26 +136,17 @@ impl<'p, 'a> Deviance<'p, 'a> {
     }
 
     /// Recording minus prediction.
-    pub(crate) fn residual(&self, point: &[f64]) -> Option<Series> {
-        self.run(point).map(|r| r.residual)
+    pub(crate) fn residual(&mut self, point: &[f64]) -> Option<Series> {
+        self.at(point).map(|r| r.residual.clone())
     }
 
     /// White noise of the size of the residual at a point.
-    pub(crate) fn rescale(&self, point: &[f64]) -> Option<Noise> {
+    pub(crate) fn rescale(&mut self, point: &[f64]) -> Option<Noise> {
         Some(Noise::white(
-            &self.residual(point)?,
+            &self.at(point)?.residual,
             self.problem.outputs(),
             &self.problem.mask,
         ))
-    }
-
-    fn at(&mut self, point: &[f64]) -> Option<Runs> {
-        for known in [&self.last, &self.accepted].into_iter().flatten() {
-            if known.at == point {
-                return Some(known.clone());
-            }
-        }
-        self.run(point)
     }
 
     #[allow(
@@ -290,17 +295,14 @@ pub(super) struct Covariances {
 
 impl Objective for Deviance<'_, '_> {
     fn deviance(&mut self, point: &[f64]) -> Option<f64> {
-        let runs = self.run(point)?;
+        let runs = self.at(point)?;
         let deviance = self.noise.deviance(&runs.residual, &self.problem.mask);
-        let runs = self.last.replace(runs);
-        if let Some(runs) = runs {
-            self.accepted = Some(runs);
-        }
         deviance.is_finite().then_some(deviance)
     }
 
     fn curvature(&mut self, point: &[f64]) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let runs = self.at(point)?;
+        self.base = Some(Rc::clone(&runs));
         let (jacobian, frozen) = self.jacobian(&runs, self.slopes)?;
         if !frozen {
             // External simulators and plants that are linear in their states have exact slopes only.

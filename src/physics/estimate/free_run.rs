@@ -138,7 +138,7 @@ pub(super) fn fit_free_run(problem: &Problem) -> Option<Fit> {
     let mut tried: Vec<(f64, Vec<f64>)> = starts
         .into_par_iter()
         .filter_map(|(mut point, held)| {
-            let deviance = white_fit_holding(&short, &mut point, glance, held)?;
+            let (deviance, _) = white_fit_holding(&short, &mut point, glance, held)?;
             Some((deviance, point))
         })
         .collect();
@@ -179,7 +179,7 @@ pub(super) fn leaves_noise(problem: &Problem, fit: &Fit) -> bool {
     if fit.noise.colours.iter().any(|c| c.len() > 0) {
         return false;
     }
-    let objective = Deviance::new(problem, Form::FreeRun, fit.noise.clone());
+    let mut objective = Deviance::new(problem, Form::FreeRun, fit.noise.clone());
     let (Some(residual), Some(simulated)) = (
         objective.residual(&fit.point),
         objective.simulated(&fit.point),
@@ -224,16 +224,16 @@ pub(super) fn coloured_fit(problem: &Problem, mut point: Vec<f64>, rival: f64) -
 
 /// Improves a point under white noise whose size is that of what is left; gives the deviance with the size at the end.
 pub(super) fn white_fit(problem: &Problem, point: &mut Vec<f64>, effort: Effort) -> Option<f64> {
-    white_fit_holding(problem, point, effort, None)
+    white_fit_holding(problem, point, effort, None).map(|(deviance, _)| deviance)
 }
 
-/// The same with one of the parameters held.
-fn white_fit_holding(
+/// The same with one of the parameters held; gives the noise too.
+pub(super) fn white_fit_holding(
     problem: &Problem,
     point: &mut Vec<f64>,
     effort: Effort,
     held: Option<usize>,
-) -> Option<f64> {
+) -> Option<(f64, Noise)> {
     let mut objective = Deviance::new(problem, Form::FreeRun, Noise::unit(problem.outputs()));
     let mut ranges = problem.ranges();
     if let Some(i) = held {
@@ -247,9 +247,7 @@ fn white_fit_holding(
         objective.noise = objective.rescale(point)?;
         minimise(&mut objective, point, &ranges, effort)?;
     }
+    let noise = objective.rescale(point)?;
     let residual = objective.residual(point)?;
-    Some(
-        Noise::white(&residual, problem.outputs(), &problem.mask)
-            .deviance(&residual, &problem.mask),
-    )
+    Some((noise.deviance(&residual, &problem.mask), noise))
 }

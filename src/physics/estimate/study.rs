@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::deviance::{Deviance, Slopes};
-use super::free_run::{follows, white_fit};
+use super::free_run::{follows, white_fit_holding};
 use super::observer::{self, unbounded};
 use super::optimise::{Effort, minimise};
 use super::problem::{EstimateError, PlantRecording, Problem, penalty};
@@ -94,9 +94,7 @@ impl<'a> Study<'a> {
     /// The same with a given effort.
     pub(crate) fn least_squares_with(&self, from: &[f64], effort: Effort) -> Option<Fit> {
         let mut point = from[..self.problem.nominal().len()].to_vec();
-        let deviance = white_fit(&self.problem, &mut point, effort)?;
-        let objective = Deviance::new(&self.problem, Form::FreeRun, Noise::unit(self.outputs()));
-        let noise = objective.rescale(&point)?;
+        let (deviance, noise) = white_fit_holding(&self.problem, &mut point, effort, None)?;
         let fit = Fit {
             form: Form::FreeRun,
             point,
