@@ -1,6 +1,7 @@
 //! Units: products of powers of the seven base units. Factors (milli, hour, degree) are left out, only dimensions count.
 
 mod check;
+mod infer;
 mod symbols;
 #[cfg(test)]
 mod tests;
@@ -10,6 +11,7 @@ mod words;
 
 pub use check::check_units;
 pub(crate) use check::unit_conflicts;
+pub(crate) use infer::units_in_words;
 pub(crate) use types::type_unit;
 pub use unknown::{UnknownUnit, unknown_units};
 

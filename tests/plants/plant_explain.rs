@@ -32,6 +32,13 @@ fn a_missing_drag_is_named_in_its_equation_and_can_be_simulated() {
         (value + 2.5).abs() < 4.0 * std && std < 0.5,
         "{value} +- {std}"
     );
+    // N over the square of m/s.
+    assert_eq!(strength["unit"], "kg/m");
+    let summary = said["summary"].to_string();
+    assert!(
+        summary.contains("Estimated: signed_square_c = -2."),
+        "{summary}"
+    );
     let law = &effect["law"];
     let (at, curve) = (
         law["at"].as_array().unwrap(),

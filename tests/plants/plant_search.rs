@@ -42,6 +42,32 @@ fn a_load_is_dated_to_the_sample() {
     );
     let instant = said["effects"][0]["parameters"]["load_step_t0"]["value"].as_f64();
     assert!((instant.unwrap() - 23.47).abs() < 0.02, "{instant:?}");
+    // It acts from there to the end of the recording.
+    let window = said["where"]["time"][0].as_array().unwrap();
+    assert_eq!(window[0].as_f64(), instant);
+    assert!(
+        (window[1].as_f64().unwrap() - 50.0).abs() < 0.1,
+        "{window:?}"
+    );
+    assert_eq!(said["where"]["outputs"][0], "y");
+}
+
+/// The stop is met where the cart goes far, and only there.
+#[test]
+fn the_operating_region_of_a_contact_is_said() {
+    let folder = Folder::new();
+    folder.text("cart.mo", CART);
+    let stop = |x: f64, _: f64, _: f64| -400.0 * (x - 0.25).max(0.0);
+    record(&folder, "log.csv", 1.0, stop, 4);
+    let said = explained(&folder, "log.csv");
+    assert_eq!(
+        said["effects"][0]["effect"], "end_stop",
+        "{}",
+        said["summary"]
+    );
+    let regions = said["where"]["regime"].as_array().unwrap();
+    let far = |r: &&serde_json::Value| r["variable"] == "y" && r["to"].as_f64().unwrap() > 0.25;
+    assert!(regions.iter().any(|r| far(&r)), "{regions:?}");
 }
 
 #[test]

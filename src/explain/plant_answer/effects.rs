@@ -29,7 +29,7 @@ impl Answer<'_> {
         };
         let name = |v| before.variable(v).column().to_owned();
         let (at, enters) = (name(at), name(entered));
-        let covariance = self.whole.covariance(&self.found.fit);
+        let covariance = &self.within_bounds;
         let mut parameters = BTreeMap::new();
         for (name, at) in self.parameters_of(fitted) {
             let std = covariance[(at, at)].max(0.0).sqrt();
@@ -38,7 +38,7 @@ impl Answer<'_> {
                 Quantity {
                     value: self.found.fit.point[at],
                     std: std.is_finite().then_some(std),
-                    unit: String::new(),
+                    unit: self.unit(name),
                 },
             );
         }
@@ -113,6 +113,13 @@ impl Answer<'_> {
             .filter_map(move |name| Some((name, position(name)?)))
     }
 
+    /// The unit of a parameter in words; empty for a pure number.
+    fn unit(&self, parameter: &str) -> String {
+        let variable = self.found.plant.spec.find(parameter);
+        let unit = variable.and_then(|v| self.units[v.index()].clone());
+        unit.filter(|u| u != "1").unwrap_or_default()
+    }
+
     /// What is added to an equation, as a curve of its one argument, with its standard deviation.
     fn law(&self, fitted: &Fitted) -> Option<Law> {
         let term = fitted.lead.term;
@@ -133,7 +140,7 @@ impl Answer<'_> {
             .map(|i| low + (high - low) * i as f64 / (LAW_POINTS - 1) as f64)
             .collect();
         let value = self.curve_of(fitted, &values, &at)?;
-        let covariance = self.whole.covariance(&self.found.fit);
+        let covariance = &self.within_bounds;
         let mut slopes = Vec::new();
         for (i, &p) in at_point.iter().enumerate() {
             let step = DIFFERENCE * (values[i].abs() + covariance[(p, p)].max(0.0).sqrt());

@@ -2,11 +2,14 @@
 
 mod effects;
 mod hypotheses;
+mod location;
 mod question;
 mod simulate;
 
 pub use question::{PlantOptions, PlantQuestionError};
 pub use simulate::{AugmentedPlantError, Original};
+
+use nalgebra::DMatrix;
 
 use super::answer::extremes;
 use super::engine::fitting::fitted::Fitted;
@@ -19,7 +22,7 @@ use super::engine::terms::library::Port;
 use super::engine::thresholds::{LEFT, SURE, chance};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
-    FitTable, Location, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
+    FitTable, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
 };
 use super::locate::{spectrum, spectrum_picture};
 use super::words::{number, quantity};
@@ -27,10 +30,12 @@ use crate::identify::Recording;
 use crate::log::{Channel, Log};
 use crate::noise::Series;
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
-use crate::physics::{Excitation, Hold, ModelSpec, Plant, Span};
+use crate::physics::{Excitation, Hold, ModelSpec, Plant, Span, units_in_words};
 
 /// A parameter is said to differ from the text where it does by so many standard deviations.
 const DIFFERENT: f64 = 3.3;
+/// Parameters of an effect that the summary lists.
+const MOST_ESTIMATES: usize = 6;
 /// Points of a picture.
 const TRACE_POINTS: usize = 1500;
 
@@ -55,15 +60,20 @@ pub fn explain_plant(
         free: vec![true; plant.spec.parameters().len()],
         ..found.options.clone()
     };
+    let whole =
+        Study::new(&found.plant, &recordings, &found.options)?.with_information(found.information);
+    let covariance = whole.covariance(&found.fit);
     let answer = Answer {
         plant,
         recordings: &recordings,
         base: Study::new(plant, &recordings, &base_options)?,
-        whole: Study::new(&found.plant, &recordings, &found.options)?
-            .with_information(found.information),
+        within_bounds: within_bounds(&plant.spec, covariance.clone()),
+        covariance,
+        whole,
         hold,
         found: &found,
         hypotheses: &scope.hypotheses,
+        units: units_in_words(&found.plant.spec),
         channels: logs
             .first()
             .map_or_else(Vec::new, |log| log.outputs.clone()),
@@ -80,6 +90,27 @@ struct Answer<'a> {
     found: &'a Found,
     hypotheses: &'a [Hypothesis],
     channels: Vec<Channel>,
+    /// Of every variable of the plant with its effects.
+    units: Vec<Option<String>>,
+    /// Covariance of the free numbers of the final fit.
+    covariance: DMatrix<f64>,
+    /// The same with what the bounds of the text say of its parameters.
+    within_bounds: DMatrix<f64>,
+}
+
+/// A covariance of numbers that begin with the parameters of a text, given that these are within their bounds: an observation of
+/// each with the variance of a uniform distribution (the update of a Kalman filter, one parameter after the other). Parameters
+/// that the recording determines only together have values of their own then.
+fn within_bounds(spec: &ModelSpec, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
+    for (i, v) in spec.parameters().into_iter().enumerate() {
+        let variable = spec.variable(v);
+        let variance = (variable.max - variable.min).powi(2) / 12.0;
+        let column = covariance.column(i).into_owned();
+        if variance.is_finite() && column[i].is_finite() && column[i] > 0.0 {
+            covariance -= &column * column.transpose() / (column[i] + variance);
+        }
+    }
+    covariance
 }
 
 /// Hypotheses are told apart by their names.
@@ -232,6 +263,7 @@ impl Answer<'_> {
             &outputs[shows],
             &train,
             self.held_out(shows, &train).as_ref(),
+            p_value,
         );
         if !runs {
             summary.push(
@@ -246,16 +278,7 @@ impl Answer<'_> {
             summary,
             alternatives: self.alternatives(verdict),
             hypotheses: self.hypotheses(&recorded, &only, shows),
-            location: Location {
-                outputs: if verdict == Verdict::Consistent {
-                    vec![]
-                } else {
-                    outputs.clone()
-                },
-                port: self.port(),
-                equations: self.found.map.clone(),
-                ..Location::default()
-            },
+            location: self.location(verdict, &recorded, &only, shows),
             fit: FitTable {
                 output: outputs[shows].clone(),
                 train: train.clone(),
@@ -384,7 +407,7 @@ impl Answer<'_> {
 
     /// Parameters of the text that the recording contradicts, estimated beside what was found.
     fn parameters(&self) -> Vec<ParameterChange> {
-        let covariance = self.whole.covariance(&self.found.fit);
+        let covariance = &self.covariance;
         let nominal = self.plant.nominal().parameters;
         let spec = &self.plant.spec;
         let each = spec.parameters().into_iter().enumerate();
@@ -474,6 +497,7 @@ impl Answer<'_> {
         output: &str,
         train: &FitSteps,
         held_out: Option<&FitSteps>,
+        p_value: f64,
     ) -> Vec<String> {
         let mut lines = Vec::new();
         match verdict {
@@ -484,11 +508,20 @@ impl Answer<'_> {
                 "The equations explain the recording with other parameters; nothing is missing in them.".to_owned(),
             ),
             Verdict::Named | Verdict::Family => {
-                lines.extend(effects.iter().map(|e| format!("{}.", e.sentence)));
+                for effect in effects {
+                    lines.push(format!("{}.", effect.sentence));
+                    lines.extend(estimates(effect));
+                }
             }
             Verdict::Unexplained => lines.push(
                 "Something is missing in the equations, and no term of the library describes it surely.".to_owned(),
             ),
+        }
+        if !effects.is_empty() && p_value < CHANCE {
+            lines.push(
+                "Score tests still find structure in the residuals: more is missing than this."
+                    .to_owned(),
+            );
         }
         if !parameters.is_empty() {
             let each: Vec<String> = parameters
@@ -528,6 +561,16 @@ impl Answer<'_> {
     }
 }
 
+/// The parameters of an effect with their standard deviations; none for a curve, which has too many.
+fn estimates(effect: &EffectFound) -> Option<String> {
+    let few = (1..=MOST_ESTIMATES).contains(&effect.parameters.len());
+    let each = effect.parameters.iter();
+    let each: Vec<String> = each
+        .map(|(name, q)| format!("{name} = {}", quantity(q)))
+        .collect();
+    few.then(|| format!("Estimated: {}.", each.join("; ")))
+}
+
 /// Share of such answers that were right on the first 37 plants of the physical cases that the engine was developed on; not
 /// calibrated on others.
 fn probability(verdict: Verdict) -> f64 {
@@ -535,5 +578,35 @@ fn probability(verdict: Verdict) -> f64 {
         Verdict::Named | Verdict::Family => 0.6,
         Verdict::Unexplained => 0.4,
         Verdict::Consistent | Verdict::Parameters => 0.8,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::parse;
+
+    #[test]
+    fn bounds_are_observations_of_the_parameters() {
+        let text = "model Cart
+               parameter Real m(min=1, max=3) = 2; parameter Real d(min=0) = 1;
+               input Real u; output Real y; Real v;
+             equation m*der(v) = u - d*v; y = v; end Cart;";
+        let spec = parse(text).unwrap();
+        // Mass, damper and a number of an effect that is found by its ratio to the mass only.
+        let covariance =
+            DMatrix::from_row_slice(3, 3, &[9.0, 0.1, 4.4, 0.1, 0.5, 0.2, 4.4, 0.2, 2.2]);
+        let found = within_bounds(&spec, covariance.clone());
+        let mut information = covariance.clone().try_inverse().unwrap();
+        information[(0, 0)] += 12.0 / 4.0;
+        let expected = information.try_inverse().unwrap();
+        assert!((&found - &expected).norm() < 1e-9, "{found} {expected}");
+        assert!(found[(2, 2)] < 0.2 * covariance[(2, 2)]);
+        // What is not determined at all stays so.
+        let mut none = covariance;
+        none.row_mut(2).fill(0.0);
+        none.column_mut(2).fill(0.0);
+        none[(2, 2)] = f64::INFINITY;
+        assert_eq!(within_bounds(&spec, none)[(2, 2)], f64::INFINITY);
     }
 }

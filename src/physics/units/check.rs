@@ -11,7 +11,7 @@ use crate::physics::syntax::constant;
 
 /// What is known about the unit of an expression.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Known {
+pub(super) enum Known {
     /// Nothing.
     Nothing,
     /// Made of literals: takes any unit in a sum.
@@ -41,7 +41,7 @@ impl Known {
     }
 
     /// The unit, where it is certain enough to be compared.
-    fn certain(self) -> Option<Unit> {
+    pub(super) fn certain(self) -> Option<Unit> {
         match self {
             Self::Is {
                 unit, gain: false, ..
@@ -61,19 +61,7 @@ pub fn check_units(spec: &ModelSpec) -> Result<(), SpecError> {
 
 /// All conflicts that [`check_units`] looks for, in the order of the text. What is made of parts in conflict is not compared.
 pub(crate) fn unit_conflicts(spec: &ModelSpec) -> Vec<SpecError> {
-    let mut checker = Checker {
-        spec,
-        words: Words::new(spec),
-        used: used(spec),
-        known: vec![Known::Nothing; spec.expressions.len()],
-        conflicts: vec![],
-    };
-    for index in 0..spec.expressions.len() {
-        if checker.used[index] {
-            let id = ExpressionId(index as u32);
-            checker.known[index] = checker.examine(id);
-        }
-    }
+    let mut checker = Checker::examined(spec);
     checker.equations();
     checker.values();
     let mut conflicts = checker.conflicts;
@@ -107,13 +95,33 @@ fn used(spec: &ModelSpec) -> Vec<bool> {
     used
 }
 
-struct Checker<'a> {
+pub(super) struct Checker<'a> {
     spec: &'a ModelSpec,
     words: Words<'a>,
-    used: Vec<bool>,
-    known: Vec<Known>,
+    pub(super) used: Vec<bool>,
+    pub(super) known: Vec<Known>,
     /// Where they stand, and what is said about them.
     conflicts: Vec<(Span, String)>,
+}
+
+impl<'a> Checker<'a> {
+    /// Finds what is known of every expression.
+    pub(super) fn examined(spec: &'a ModelSpec) -> Self {
+        let mut checker = Self {
+            spec,
+            words: Words::new(spec),
+            used: used(spec),
+            known: vec![Known::Nothing; spec.expressions.len()],
+            conflicts: vec![],
+        };
+        for index in 0..spec.expressions.len() {
+            if checker.used[index] {
+                let id = ExpressionId(index as u32);
+                checker.known[index] = checker.examine(id);
+            }
+        }
+        checker
+    }
 }
 
 impl Checker<'_> {
