@@ -60,6 +60,7 @@ pub(crate) fn determine(draft: Draft) -> Result<ModelSpec, Vec<SpecError>> {
             value: settled.value,
             number: settled.number,
             span: declared.span,
+            uncorrected: false,
         })
         .collect();
     Ok(ModelSpec {

@@ -49,6 +49,9 @@ pub struct Variable {
     pub number: Option<f64>,
     /// Where it is declared: the name.
     pub span: Span,
+    /// A state that an observer does not correct, such as the memory of an effect: corrected, it would stand for any
+    /// disturbance.
+    pub(crate) uncorrected: bool,
 }
 
 impl Variable {

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::explain::engine::thresholds::MOST_STEPS;
+use crate::explain::engine::thresholds::{FOLLOWS, MOST_STEPS};
 use crate::noise::Series;
 use crate::physics::estimate::{Effort, EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, Plant};
@@ -12,9 +12,6 @@ use crate::physics::{Hold, Plant};
 const BLOCKS: usize = 3;
 /// Less of the mean square error in blocks left out is not explained: what is left is then more than what was found.
 pub(crate) const EXPLAINED: f64 = 0.5;
-/// Free runs whose errors are larger than this part of the standard deviation follow nothing: a sensor that shows a constant
-/// comes near 1.
-const FOLLOWS: f64 = 0.95;
 /// Errors of this many standard deviations and more are those of a run that leaves the recording.
 const STAYS: f64 = 10.0;
 /// Effort of a fit from that to all of the recordings.
@@ -64,12 +61,14 @@ impl HeldOut {
 
     /// Whether free runs follow the recordings clearly better than their means do.
     pub(crate) fn follows(&self) -> bool {
-        ratio(&self.squares, &self.variances) < FOLLOWS
+        ratio(&self.squares, &self.variances) < FOLLOWS && self.stays()
     }
 
-    /// Whether free runs stay near the recordings, even if they do not follow them: those of an unstable plant leave them.
+    /// Whether free runs stay near the recordings in every output, even if they do not follow them: those of an unstable plant
+    /// leave them.
     pub(super) fn stays(&self) -> bool {
-        ratio(&self.squares, &self.variances) < STAYS
+        let mut outputs = self.squares.iter().zip(&self.variances);
+        outputs.all(|(square, variance)| *square < STAYS * STAYS * variance)
     }
 }
 

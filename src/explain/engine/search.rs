@@ -107,7 +107,7 @@ fn judge_by_blocks(
         let of = |f: &Fitted| (f.lead.place, f.argument.clone());
         of(&fitted[i]) != of(&fitted[j])
     };
-    let explains = |errors: &HeldOut| errors.removed(&without) >= EXPLAINED;
+    let explains = |errors: &HeldOut| errors.follows() && errors.removed(&without) >= EXPLAINED;
     let provable = |i: usize| fitted[i].lead.term.needs != Needs::Time;
     let mut chosen: Option<&(usize, HeldOut)> = None;
     for candidate @ (i, errors) in &judged {

@@ -103,7 +103,7 @@ pub(crate) fn select(
                 }
                 _ => true,
             })
-            .filter(|r| r.search == 0 || r.accepted <= most)
+            .filter(|r| r.search == 0 || r.accepted <= most && r.held_out.follows())
             .collect();
         chosen = match winner(&improving) {
             // Without an effect the tests of the likelihood count.

@@ -7,14 +7,16 @@ use crate::explain::engine::fitting::edit::Place;
 use crate::explain::engine::fitting::finish::finished;
 use crate::explain::engine::fitting::fitted::{Fitted, TIE, order, searched, with_more};
 use crate::explain::engine::fitting::formulas::formulas;
+use crate::explain::engine::fitting::refined_curve::refined_curve;
 use crate::explain::engine::fitting::second_effect::drop_alike;
 use crate::explain::engine::hypothesis::{Ground, trials};
 use crate::explain::engine::scope::Scope;
 use crate::explain::engine::screening::screen::{Lead, Screen, screen};
 use crate::explain::engine::terms::names::{SPECIFIC, named, rank_of};
 use crate::explain::engine::thresholds::{
-    AT_A_PLACE, BETTER, COMPARED, FINISHED, FITTED, FORETOLD, GLANCE, GLANCED, GLANCED_ACCURACY,
-    GLANCED_STEPS, IMITATED, LEFT, MOST, MOST_STEPS, NEEDED, OF_A_KIND, THOROUGH, chance,
+    AT_A_PLACE, BETTER, COMPARED, FINISHED, FITTED, FOLLOWS, FORETOLD, GLANCE, GLANCED,
+    GLANCED_ACCURACY, GLANCED_STEPS, IMITATED, LEFT, MOST, MOST_STEPS, NEEDED, OF_A_KIND, THOROUGH,
+    chance,
 };
 use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{EstimateOptions, Fit, Form, PlantRecording, Study};
@@ -82,7 +84,6 @@ pub(super) fn improved(stage: &Stage, fitted: &[Fitted]) -> Option<Fit> {
         .iter()
         .filter(|f| f.hypothesis.is_none() && f.gain > NEEDED);
     best.take(FINISHED)
-        .filter(|f| f.candidate.new_states == 0)
         .filter_map(|f| stage.study.refit(&f.without_term(first), 1, THOROUGH))
         .filter(|again| again.criterion < stage.fit.criterion - BETTER)
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
@@ -103,9 +104,8 @@ fn drop_repeated(mut fitted: Vec<Fitted>) -> Vec<Fitted> {
 
 /// Where the fit of a candidate starts: with the other numbers as they were, or as the regression on its term moves them.
 fn started(inner: &Study, made: &Candidate, lead: &Lead, (study, from): (&Study, &Fit)) -> Fit {
-    let states = study.plant().spec.states().len();
-    let (parameters, outputs) = (study.parameters(), study.outputs());
-    let plain = made.from(from, parameters, states, outputs);
+    let parameters = study.parameters();
+    let plain = made.from(from, parameters);
     if lead.shift.is_empty() {
         return plain;
     }
@@ -113,13 +113,24 @@ fn started(inner: &Study, made: &Candidate, lead: &Lead, (study, from): (&Study,
         point: study.moved(from, &lead.shift),
         ..from.clone()
     };
-    let moved = made.from(&moved, parameters, states, outputs);
+    let moved = made.from(&moved, parameters);
     let deviance = |fit: &Fit| inner.deviance(fit).unwrap_or(f64::INFINITY);
     if deviance(&moved) < deviance(&plain) {
         moved
     } else {
         plain
     }
+}
+
+/// Whether a sensor shows more than a constant with the term in it.
+fn still_shows((study, fit): (&Study, &Fit), lead: &Lead, spec: &ModelSpec) -> bool {
+    if !lead.sensor {
+        return true;
+    }
+    let variable = lead.place.variable(spec);
+    let output = spec.outputs().into_iter().position(|y| y == variable);
+    let left = output.and_then(|o| study.left(fit)?.get(o).copied());
+    left.is_none_or(|left| left < FOLLOWS * FOLLOWS)
 }
 
 /// What a step has found.
@@ -146,9 +157,7 @@ pub(super) fn step(stage: &Stage) -> Step {
         scope,
         open,
     } = *stage;
-    let states = plant.spec.states().len();
     let parameters = study.parameters();
-    let outputs = study.outputs();
     let mut tried: Vec<(Screen, Fit)> = Vec::new();
     if let Some(s) = screen(study, fit, fit, given, recordings) {
         tried.push((s, fit.clone()));
@@ -237,7 +246,7 @@ pub(super) fn step(stage: &Stage) -> Step {
             let inner = study.of(&rough, &options).ok()?;
             let start = match screen.strays {
                 true => started(&inner, &made, &lead, (study, from)),
-                false => made.from(from, parameters, states, outputs),
+                false => made.from(from, parameters),
             };
             // What a memory does within a sample, such as a contact, frozen slopes do not see.
             let fitted = match made.new_states {
@@ -283,9 +292,7 @@ pub(super) fn step(stage: &Stage) -> Step {
             let mut starts = vec![from.clone()];
             if from.form != fit.form {
                 let mut point = from.point.clone();
-                let gains = states * outputs;
-                point.extend(&fit.point[fit.point.len() - gains..]);
-                point.extend(std::iter::repeat_n(0.0, made.new_states * outputs));
+                point.extend(&fit.point[fit.point.len() - study.gains()..]);
                 starts.push(Fit {
                     form: fit.form,
                     point,
@@ -298,7 +305,10 @@ pub(super) fn step(stage: &Stage) -> Step {
                     0 => inner.compare(start, COMPARED),
                     _ => inner.refit(start, 1, THOROUGH),
                 })
-                .filter(|fit| fit.form == Form::Innovation || inner.follows(fit))
+                .filter(|fit| {
+                    fit.form == Form::Innovation
+                        || inner.follows(fit) && still_shows((&inner, fit), &lead, &plant.spec)
+                })
                 .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
             let gain = fit.criterion - best.criterion - searched(&lead, recordings);
             let argument = lead.argument.map(|a| &arguments[a]);
@@ -334,12 +344,15 @@ pub(super) fn step(stage: &Stage) -> Step {
         options,
     };
     fitted.extend(trials(&scope.hypotheses, open, &ground));
-    // A formula says in two or three numbers what a curve says in nine. Of equals the curve stays: it is level beyond its ends.
+    // A formula says in two or three numbers what a curve says in nine or more. Of equals the curve stays: it is level beyond
+    // its ends.
     let best = fitted.iter().map(|f| f.gain).fold(0.0, f64::max);
-    let curve = fitted
-        .iter()
-        .find(|f| f.lead.curve.is_some() && f.gain > (1.0 - TIE.1) * best);
-    if let (Some(curve), Some((screen, _))) = (curve, tried.first()) {
+    let close = |f: &Fitted| f.lead.curve.is_some() && f.gain > (1.0 - TIE.1) * best;
+    if let (Some(at), Some((screen, _))) = (fitted.iter().position(close), tried.first()) {
+        if let Some(finer) = refined_curve(&fitted[at], &screen.arguments, &ground) {
+            fitted[at] = finer;
+        }
+        let curve = &fitted[at];
         let mut better = formulas(curve, &screen.arguments, &ground);
         better.retain(|f| f.gain > curve.gain + TIE.0);
         fitted.extend(better);

@@ -18,6 +18,9 @@ pub(crate) const GLANCE: Effort = Effort {
 };
 /// Error of a step where fits are only compared with each other.
 pub(crate) const GLANCED_ACCURACY: f64 = 1e-6;
+/// Free runs whose errors are larger than this part of the standard deviation follow nothing: a sensor that shows a constant
+/// comes near 1.
+pub(crate) const FOLLOWS: f64 = 0.95;
 /// Steps a sample that a candidate may need, on average; one that needs more is left out, for the time it costs.
 pub(crate) const GLANCED_STEPS: usize = 20;
 pub(crate) const MOST_STEPS: usize = 60;

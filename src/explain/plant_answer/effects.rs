@@ -63,6 +63,18 @@ impl Answer<'_> {
             [] => String::new(),
             names => format!(" as a function of {}", names.join(" and ")),
         };
+        let equation = fitted.candidate.equation.clone();
+        // A curve is called f: its pieces are no reading.
+        let readable = match &fitted.lead.curve {
+            Some(curve) => {
+                let values = fitted.candidate.names.iter().rev().take(curve.values.len());
+                let names: Vec<String> = values.rev().cloned().collect();
+                let argument = &fitted.argument;
+                let text = format!("({})", curve.text(argument, &names));
+                equation.replace(&text, &format!("f({argument})"))
+            }
+            None => equation.clone(),
+        };
         Some(EffectFound {
             hypothesis: fitted.hypothesis.is_some(),
             effect: id.clone(),
@@ -74,7 +86,7 @@ impl Answer<'_> {
                 Port::Equation | Port::Parameter => "process",
             }
             .to_owned(),
-            equation: fitted.candidate.equation.clone(),
+            equation,
             law: self.law(fitted),
             enters: Some(enters),
             depends,
@@ -91,7 +103,7 @@ impl Answer<'_> {
                     Some(_) => format!("The hypothesis {id}"),
                     None => spoken(&id),
                 },
-                fitted.candidate.equation
+                readable
             ),
         })
     }

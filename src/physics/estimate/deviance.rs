@@ -157,12 +157,16 @@ impl<'p, 'a> Deviance<'p, 'a> {
     fn jacobian(&self, runs: &Runs, slopes: Slopes) -> Option<(DMatrix<f64>, bool)> {
         let problem = self.problem;
         let gain = self.gain(&runs.at);
-        let (n, l) = (problem.states(), problem.outputs());
+        let l = problem.outputs();
         let parameters = problem.free.iter().map(|&i| Direction::Parameter(i));
         let starts = problem.starts.iter().map(|&i| Direction::Start(i));
         let mut directions: Vec<Direction> = parameters.chain(starts).collect();
         if gain.is_some() && !self.gain_held {
-            directions.extend((0..n).flat_map(|i| (0..l).map(move |j| Direction::Gain(i, j))));
+            directions.extend(
+                problem
+                    .places_of_gains()
+                    .map(|(i, j)| Direction::Gain(i, j)),
+            );
         }
         let (p, s, count) = (
             problem.free.len(),

@@ -154,7 +154,7 @@ fn initial_states(
     problem: &Problem,
     held: &Held,
 ) -> Result<(Vec<f64>, Noise, bool), EstimateError> {
-    let (n, l, p) = (problem.states(), problem.outputs(), problem.free.len());
+    let (l, p) = (problem.outputs(), problem.free.len());
     let mut point = problem.nominal();
     if let Some(starts) = &held.starts {
         let known = starts.iter().flat_map(|s| {
@@ -167,7 +167,7 @@ fn initial_states(
     }
     let numbers = point.len();
     if let Some(gain) = held.gain {
-        point.extend((0..n).flat_map(|i| (0..l).map(move |j| gain[(i, j)])));
+        point.extend(problem.places_of_gains().map(|at| gain[at]));
     }
     let pinned = |&value: &f64| Range {
         min: value,

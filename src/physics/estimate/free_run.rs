@@ -78,8 +78,13 @@ pub(super) fn continue_free_run(problem: &Problem, innovation: &Fit) -> Option<F
 
 /// Whether what is left of each output is smaller than its spread about its mean.
 pub(super) fn follows(problem: &Problem, residual: &Series) -> bool {
+    left(problem, residual).iter().all(|part| *part < 1.0)
+}
+
+/// What is left of each output, as a part of its sum of squares about its mean.
+pub(super) fn left(problem: &Problem, residual: &Series) -> Vec<f64> {
     let l = problem.outputs();
-    (0..l).all(|o| {
+    let of_output = |o: usize| {
         let (mut left, mut values) = (0.0, Vec::new());
         let recorded = problem.recordings.iter().map(|r| &r.outputs[o]);
         for (e, y) in residual.iter().skip(o).step_by(l).zip(recorded) {
@@ -90,8 +95,9 @@ pub(super) fn follows(problem: &Problem, residual: &Series) -> bool {
             }
         }
         let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-        left < values.iter().map(|y| (y - mean).powi(2)).sum()
-    })
+        left / values.iter().map(|y| (y - mean).powi(2)).sum::<f64>()
+    };
+    (0..l).map(of_output).collect()
 }
 
 /// The fit in free run from the values of the text and, unless that leaves white noise that does not depend on the inputs, to

@@ -28,13 +28,12 @@ const STEPS: usize = 300;
 
 /// The fit in innovation form, from a point of the other form or from the values of the text.
 pub(super) fn fit(problem: &Problem, from: Option<&[f64]>) -> Option<Fit> {
-    let (n, l) = (problem.states(), problem.outputs());
-    if n == 0 {
+    if problem.gains() == 0 {
         return None;
     }
     let nominal = from.map_or_else(|| problem.nominal(), <[f64]>::to_vec);
     let mut ranges = problem.ranges();
-    ranges.extend(unbounded(n * l));
+    ranges.extend(unbounded(problem.gains()));
     let mut starts = starts(problem, &nominal);
     starts.truncate(SEARCHED);
     let found: Vec<Fit> = starts
@@ -48,18 +47,17 @@ pub(super) fn fit(problem: &Problem, from: Option<&[f64]>) -> Option<Fit> {
 
 /// Parameters and initial states with the gains that no search has improved yet, best first.
 pub(super) fn starts(problem: &Problem, numbers: &[f64]) -> Vec<Fit> {
-    let (n, l) = (problem.states(), problem.outputs());
+    let l = problem.outputs();
     let start = |gain: DMatrix<f64>| {
         let mut point = numbers.to_vec();
-        let elements = (0..n).flat_map(|i| (0..l).map(move |j| (i, j)));
-        point.extend(elements.map(|at| gain[at]));
+        point.extend(problem.places_of_gains().map(|at| gain[at]));
         let mut objective = Deviance::new(problem, Form::Innovation, Noise::unit(l));
         objective.noise = objective.rescale(&point)?;
         let residual = objective.residual(&point)?;
         let deviance = objective.noise.deviance(&residual, &problem.mask);
         Some(Fit {
             form: Form::Innovation,
-            criterion: problem.criterion(deviance, objective.noise.len(), n * l),
+            criterion: problem.criterion(deviance, objective.noise.len(), problem.gains()),
             noise: objective.noise,
             point,
             deviance,
@@ -94,8 +92,7 @@ fn from_start(problem: &Problem, mut point: Vec<f64>, ranges: &[Range]) -> Optio
             break;
         }
     }
-    let of_gain = problem.states() * l;
-    let criterion = problem.criterion(last, objective.noise.len(), of_gain);
+    let criterion = problem.criterion(last, objective.noise.len(), problem.gains());
     last.is_finite().then_some(Fit {
         form: Form::Innovation,
         point,

@@ -94,6 +94,8 @@ pub(super) struct Problem<'a> {
     pub(super) free: Vec<usize>,
     /// Places of the states whose start is free.
     pub(super) starts: Vec<usize>,
+    /// Places of the states that an observer corrects.
+    pub(super) corrected: Vec<usize>,
     /// Ramps of the switches, for each recording.
     pub(super) plans: Vec<Plan>,
     nominal: Point,
@@ -166,6 +168,9 @@ impl<'a> Problem<'a> {
         let starts = (0..states.len())
             .filter(|&i| !spec.variable(states[i]).fixed)
             .collect();
+        let corrected = (0..states.len())
+            .filter(|&i| !spec.variable(states[i]).uncorrected)
+            .collect();
         let nominal = plant.nominal();
         let plant = plant.for_search();
         let mut problem = Self {
@@ -175,6 +180,7 @@ impl<'a> Problem<'a> {
             mask: mask(recordings),
             free,
             starts,
+            corrected,
             plans: Vec::new(),
             nominal,
         };
@@ -222,6 +228,7 @@ impl<'a> Problem<'a> {
             mask: mask(recordings),
             free: self.free.clone(),
             starts: self.starts.clone(),
+            corrected: self.corrected.clone(),
             plans: self.plans.clone(),
             nominal: self.nominal.clone(),
         }
@@ -432,9 +439,25 @@ impl<'a> Problem<'a> {
 
     /// Gain of the observer in the numbers behind the initial states.
     pub(crate) fn gain(&self, numbers: &[f64]) -> DMatrix<f64> {
-        let (n, l) = (self.states(), self.outputs());
-        let gain = &numbers[numbers.len() - n * l..];
-        DMatrix::from_fn(n, l, |i, j| gain[i * l + j])
+        let l = self.outputs();
+        let free = &numbers[numbers.len() - self.gains()..];
+        let mut gain = DMatrix::zeros(self.states(), l);
+        for (row, &i) in free.chunks(l.max(1)).zip(&self.corrected) {
+            row.iter().enumerate().for_each(|(j, g)| gain[(i, j)] = *g);
+        }
+        gain
+    }
+
+    /// Free elements of the gain of an observer.
+    pub(crate) fn gains(&self) -> usize {
+        self.corrected.len() * self.outputs()
+    }
+
+    /// Places of these elements, in the order of the numbers.
+    pub(crate) fn places_of_gains(&self) -> impl Iterator<Item = (usize, usize)> {
+        let l = self.outputs();
+        let rows = self.corrected.iter();
+        rows.flat_map(move |&i| (0..l).map(move |j| (i, j)))
     }
 
     /// Standard deviations of the initial states of each recording; 0 where they are certain.

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::deviance::{Deviance, Slopes};
-use super::free_run::{follows, white_fit_holding};
+use super::free_run::{follows, left, white_fit_holding};
 use super::observer::{self, unbounded};
 use super::optimise::{Effort, minimise};
 use super::problem::{EstimateError, PlantRecording, Problem, penalty};
@@ -184,6 +184,11 @@ impl<'a> Study<'a> {
         self.problem.outputs()
     }
 
+    /// Free elements of the gain of an observer.
+    pub(crate) fn gains(&self) -> usize {
+        self.problem.gains()
+    }
+
     /// Number of values that are fitted.
     pub(crate) fn count(&self) -> usize {
         self.problem.count()
@@ -290,6 +295,11 @@ impl<'a> Study<'a> {
     pub(crate) fn follows(&self, fit: &Fit) -> bool {
         self.residual(fit)
             .is_some_and(|residual| follows(&self.problem, &residual))
+    }
+
+    /// What a fit leaves of each output, as a part of its sum of squares about its mean; none where it cannot be simulated.
+    pub(crate) fn left(&self, fit: &Fit) -> Option<Vec<f64>> {
+        Some(left(&self.problem, &self.residual(fit)?))
     }
 
     /// The plant.

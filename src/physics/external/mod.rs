@@ -360,5 +360,6 @@ fn blank(name: &str) -> Variable {
         value: None,
         number: None,
         span: Span::default(),
+        uncorrected: false,
     }
 }

@@ -5,7 +5,7 @@ use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::{Port, Starts};
 use crate::explain::engine::terms::values::filled;
-use crate::physics::estimate::{Fit, Form, PlantRecording};
+use crate::physics::estimate::{Fit, PlantRecording};
 use crate::physics::{ModelSpec, Plant};
 
 /// Shortest time constant, in samples.
@@ -161,7 +161,11 @@ pub(crate) fn candidate(
     };
     debug_assert!(!(lead.sensor && term.port != Port::Sensor));
     edit.changes.push((lead.place, format!("{{v}} + {added}")));
-    let changed = edit.apply(spec).ok()?;
+    let mut changed = edit.apply(spec).ok()?;
+    for memory in &memories {
+        let state = changed.find(memory)?;
+        changed.variables[state.index()].uncorrected = true;
+    }
     let names = edit.parameters.iter().map(|p| p.name.clone()).collect();
     Some(Candidate {
         equation: equation_text(&changed, spec, lead.place),
@@ -197,22 +201,10 @@ pub(in crate::explain::engine) fn equation_text(
 
 impl Candidate {
     /// The numbers of a fit of the plant without the term, with the term's.
-    pub(crate) fn from(&self, fit: &Fit, parameters: usize, states: usize, outputs: usize) -> Fit {
-        let gains = if fit.form == Form::Innovation {
-            states * outputs
-        } else {
-            0
-        };
-        let split = fit.point.len() - gains;
-        let mut point = fit.point[..parameters].to_vec();
-        point.extend(&self.values);
-        point.extend(&fit.point[parameters..split]);
-        point.extend(&fit.point[split..]);
-        if gains > 0 {
-            point.extend(std::iter::repeat_n(0.0, self.new_states * outputs));
-        }
+    pub(crate) fn from(&self, fit: &Fit, parameters: usize) -> Fit {
+        let (own, others) = fit.point.split_at(parameters);
         Fit {
-            point,
+            point: [own, &self.values, others].concat(),
             ..fit.clone()
         }
     }

@@ -223,7 +223,13 @@ impl Edit {
 
     /// The plant with the change.
     pub(crate) fn apply(&self, spec: &ModelSpec) -> Result<ModelSpec, SpecError> {
-        parse(&self.text(spec))
+        let mut changed = parse(&self.text(spec))?;
+        for known in spec.variables.iter().filter(|v| v.uncorrected) {
+            if let Some(state) = changed.find(&known.name) {
+                changed.variables[state.index()].uncorrected = true;
+            }
+        }
+        Ok(changed)
     }
 }
 

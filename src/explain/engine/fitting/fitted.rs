@@ -10,7 +10,8 @@ use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 
 /// Gains that differ by less, or by this part of the best, are equal.
 pub(crate) const TIE: (f64, f64) = (6.0, 0.08);
-/// The same where the best is a curve: it is free to follow any effect (math/physics.md, "Fits and decision").
+/// The same where the best is a curve: it is free to follow any effect (math/physics.md, "Fits and decision"). The first also
+/// where it is an unlisted formula.
 const TIE_WITH_CURVE: (f64, f64) = (12.0, 0.04);
 /// A gain must not rest on so few values: they may be errors of the recording.
 const FEW: usize = 1;
@@ -118,8 +119,17 @@ fn prefer_special_case(spec: &ModelSpec, fitted: &mut [Fitted]) {
 pub(in crate::explain::engine) fn order(spec: &ModelSpec, fitted: &mut [Fitted]) {
     // Among those that explain the recording as well as the best, the one with a name of its own comes first. Of several such
     // the best, unless their gains are equal.
-    if let Some((best, curve)) = fitted.first().map(|f| (f.gain, f.lead.curve.is_some())) {
-        let (least, part) = if curve { TIE_WITH_CURVE } else { TIE };
+    if let Some(first) = fitted.first() {
+        let best = first.gain;
+        // An unlisted formula is as free as a curve, of which there are many.
+        let least = match named(spec, first) {
+            "law" => TIE_WITH_CURVE.0,
+            _ => TIE.0,
+        };
+        let part = match first.lead.curve {
+            Some(_) => TIE_WITH_CURVE.1,
+            None => TIE.1,
+        };
         let tie = least.max(part * best);
         let ties = fitted.iter().take_while(|f| best - f.gain <= tie).count();
         fitted[..ties].sort_by_key(|f| name_rank(spec, f));

@@ -143,8 +143,7 @@ fn in_its_place(
     let inner = study.of(&limited, &options).ok()?;
     let parameters = study.parameters();
     let without = best.without_term(parameters);
-    let states = plant.spec.states().len();
-    let start = made.from(&without, parameters, states, study.outputs());
+    let start = made.from(&without, parameters);
     let fit = inner.refit(&start, ROUNDS, THOROUGH)?;
     Some(Fitted {
         gain: ground.fit.criterion - fit.criterion - searched(&lead, ground.recordings),

@@ -6,4 +6,5 @@ pub(crate) mod eliminate;
 pub(crate) mod finish;
 pub(crate) mod fitted;
 pub(crate) mod formulas;
+pub(crate) mod refined_curve;
 pub(crate) mod second_effect;

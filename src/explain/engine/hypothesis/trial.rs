@@ -89,7 +89,6 @@ impl Hypothesis {
         let spec = &ground.plant.spec;
         let place = self.place(spec)?;
         let parameters = ground.study.parameters();
-        let (states, outputs) = (spec.states().len(), ground.study.outputs());
         let options = with_more(ground.options, self.numbers.len());
         let (starts, searched, range) = self.starts(ground);
         let made: Vec<Candidate> = starts
@@ -105,7 +104,7 @@ impl Hypothesis {
             .into_par_iter()
             .filter_map(|(o, from, made)| {
                 let study = ground.study.of(&made.plant, &options).ok()?;
-                let start = made.from(from, parameters, states, outputs);
+                let start = made.from(from, parameters);
                 let fit = study.refit(&start, 0, GLANCE)?;
                 Some((o, from.deviance - fit.deviance, made, fit))
             })
@@ -122,7 +121,7 @@ impl Hypothesis {
                 let mut from = from.clone();
                 if from.form != ground.fit.form {
                     // From free run to the observer of the fit before.
-                    let gains = states * outputs;
+                    let gains = ground.study.gains();
                     let gains = &ground.fit.point[ground.fit.point.len() - gains..];
                     from.point.extend(gains);
                     from.form = ground.fit.form;

@@ -1,6 +1,6 @@
 //! What a missing term may be a function of, with its values along the recordings.
 
-use crate::physics::{ModelSpec, VariableId, VariableKind};
+use crate::physics::{Binary, Equation, ModelSpec, Node, VariableId, VariableKind};
 
 use crate::explain::engine::terms::library::Needs;
 use crate::explain::engine::terms::names::{is_velocity, may_be_angle, may_be_velocity};
@@ -24,6 +24,8 @@ pub(crate) struct Argument {
     /// Place of the equation behind which all of it is known; none where states and inputs are enough.
     pub(crate) known_after: Option<usize>,
     pub(crate) form: ArgumentForm,
+    /// The plant declares it as the difference of two others.
+    pub(crate) is_difference: bool,
     pub(crate) angle: bool,
     pub(crate) velocity: bool,
     /// Changes at samples only: it is made of inputs.
@@ -62,6 +64,7 @@ impl Argument {
                         .all(|&v| spec.variable(v).kind != VariableKind::Input),
             angle: variables.len() == 1
                 && (unit(variables[0]) == "rad" || may_be_angle(spec, &variables)),
+            is_difference: false,
             held,
             expression,
             variables,
@@ -132,13 +135,28 @@ impl Argument {
             Needs::BothSigns => both,
             Needs::Positive => self.quantile(0.0) >= 0.0,
             Needs::Radiation => self.form == ArgumentForm::Radiation,
-            Needs::Difference => self.form == ArgumentForm::Difference,
+            Needs::Difference => self.form == ArgumentForm::Difference || self.is_difference,
             Needs::Angle => self.angle,
             Needs::Velocity => both && self.velocity,
             Needs::OwnState => self.form == ArgumentForm::Variable && !self.held,
             Needs::Time => false,
         }
     }
+}
+
+/// The algebraic variable that is the difference of two others, in either order.
+fn difference_of(spec: &ModelSpec, a: VariableId, b: VariableId) -> Option<VariableId> {
+    let is = |e: &&Equation| match spec.expressions.node(e.rest) {
+        Node::Binary(Binary::Subtract, x, y) => {
+            let pair = (spec.expressions.node(x), spec.expressions.node(y));
+            let (a, b) = (Node::Variable(a), Node::Variable(b));
+            e.coefficient.is_none() && (pair == (a, b) || pair == (b, a))
+        }
+        _ => false,
+    };
+    let equation = spec.equations.iter().find(is)?;
+    let variable = equation.unknown.variable();
+    (spec.variable(variable).kind == VariableKind::Algebraic).then_some(variable)
 }
 
 /// Variables of the plant that something may depend on, differences of two of one unit, and products of states and inputs.
@@ -158,10 +176,7 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
             e.unknown.variable() == v
                 && spec.variable(v).kind == VariableKind::Algebraic
                 && e.coefficient.is_none()
-                && matches!(
-                    spec.expressions.node(e.rest),
-                    crate::physics::Node::Variable(_)
-                )
+                && matches!(spec.expressions.node(e.rest), Node::Variable(_))
         })
     };
     let simple: Vec<VariableId> = simple.into_iter().filter(|&v| !copies(v)).collect();
@@ -173,7 +188,12 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
     for (i, &a) in simple.iter().enumerate() {
         for &b in &simple[i + 1..] {
             let unit = |v: VariableId| spec.variable(v).unit_text.clone();
-            if unit(a).is_some() && unit(a) == unit(b) && source(a) && source(b) {
+            // What the plant calls by a name keeps that name.
+            if let Some(known) = difference_of(spec, a, b)
+                && let Some(argument) = found.iter_mut().find(|f| f.variables == [known])
+            {
+                argument.is_difference = true;
+            } else if unit(a).is_some() && unit(a) == unit(b) && source(a) && source(b) {
                 let text = format!("({} - {})", name(a), name(b));
                 let mut difference = Argument::new(spec, text, vec![a, b]);
                 difference.form = ArgumentForm::Difference;
