@@ -26,71 +26,30 @@
 //! | `engine`, `plant_answer` | simulations that are plants in equations: terms at places of the equations, and what is said |
 //! | `answer`, `account`, `words`, `explanation`, `augmented`, `start` | what is said, and the model that can be run |
 
-mod account;
-mod adequacy;
-mod answer;
-mod augmented;
-mod baseline;
-mod cascade;
-mod changes;
-mod check;
 mod columns;
-mod coordinates;
-mod curve;
-mod data;
-mod doubt;
+mod compare_explanations;
+mod document;
 pub(crate) mod effects;
 mod engine;
-mod error;
-mod explanation;
-mod features;
-mod finer;
-mod fit;
-#[cfg(test)]
-mod fixtures;
-mod functionals;
-mod inquiry;
-mod locate;
+mod explain_recordings;
+mod linear;
 mod memory;
-mod offset;
-mod plant;
 mod plant_answer;
-mod plausible;
-mod probability;
-mod prove;
-mod question;
-mod rebaseline;
-mod rectified;
-mod refine;
-mod run;
-mod screen;
-mod search;
-mod second;
-mod simplest;
-mod simulation;
-mod start;
-mod structure;
-mod tanks;
-mod templates;
-mod uncertainty;
-mod units;
-mod weak;
-mod words;
 
-pub use augmented::AugmentedError;
-pub use engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
-pub use engine::scope::UnknownPlantEffect;
-pub use engine::terms::documentation::{Imitation, PLANT_EFFECTS, PlantEffect, plant_effect};
-pub use error::ExplainError;
-pub use explanation::{
+pub use document::explain_error::ExplainError;
+pub use document::explanation::{
     Alternative, AugmentedModel, AugmentedPlant, Curve, Detectable, EXPLANATION_FORMAT,
     EffectFound, EffectSize, EquationMap, Evidence, Explanation, FitFigure, FitSteps, FitTable,
     HypothesisFit, HypothesisFound, HypothesisRival, HypothesisVerdict, Law, Location, Mechanics,
     ModelEffect, NoiseFound, ParameterChange, Quantity, Regime, Remaining, SignalReference,
     SignalTraces, StatePrior, Verdict,
 };
+pub use engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
+pub use engine::scope::UnknownPlantEffect;
+pub use engine::terms::documentation::{Imitation, PLANT_EFFECTS, PlantEffect, plant_effect};
+pub use explain_recordings::{Options, explain};
+pub use linear::augmented::simulate_augmented::AugmentedError;
+pub use linear::known_simulation::Simulation;
 pub use plant_answer::{
     AugmentedPlantError, Original, PlantOptions, PlantQuestionError, explain_plant,
 };
-pub use question::{Options, explain};
-pub use simulation::Simulation;

@@ -10,14 +10,13 @@ mod command;
 mod disturbance;
 mod flow;
 mod friction;
-mod lambert;
 mod law;
-mod linear;
 mod process;
 mod sensor;
 mod stiffness;
 #[cfg(test)]
 mod tests;
+mod wrong_parameters;
 
 pub(crate) use law::{CHARGE_ORDERS, Clock, Motion, Observed, charge, decay, level};
 
@@ -306,6 +305,6 @@ pub fn library() -> impl Iterator<Item = &'static Definition> {
 /// The entry with this id and variant, also of what is not physics but a number (`linear`).
 pub(crate) fn find(id: &str, variant: &str) -> Option<&'static Definition> {
     library()
-        .chain(linear::ENTRIES)
+        .chain(wrong_parameters::ENTRIES)
         .find(|d| d.id == id && d.variant == variant)
 }

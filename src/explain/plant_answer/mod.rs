@@ -8,7 +8,11 @@ mod simulate;
 pub use question::{PlantOptions, PlantQuestionError};
 pub use simulate::{AugmentedPlantError, Original};
 
-use super::answer::extremes;
+use super::document::explanation::{
+    AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
+    FitTable, Location, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
+};
+use super::document::sentences::{number, quantity};
 use super::engine::fitting::fitted::Fitted;
 use super::engine::holdout::{EXPLAINED, HeldOut, blocks};
 use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
@@ -17,12 +21,8 @@ use super::engine::search::Found;
 use super::engine::select::{CHANCE, select};
 use super::engine::terms::library::Port;
 use super::engine::thresholds::{LEFT, SURE, chance};
-use super::explanation::{
-    AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
-    FitTable, Location, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
-};
-use super::locate::{spectrum, spectrum_picture};
-use super::words::{number, quantity};
+use super::linear::answer::linear_answer::extremes;
+use super::linear::answer::regions::{spectrum, spectrum_picture};
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
 use crate::noise::Series;

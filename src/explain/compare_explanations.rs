@@ -1,0 +1,145 @@
+//! Which of two explanations of simulated columns is given, and what is taken back where the simulator is not understood.
+
+use super::document::explanation::{Explanation, Verdict};
+
+/// An effect beside a simulator that is neither linear nor reproduced by equations must take this part off the mean square of the
+/// error in blocks left out: more is explained than is not.
+const MOST: f64 = 0.5;
+/// Runs whose errors differ by less than this part are equally good (the tolerance of the project's score on real recordings).
+const EQUAL: f64 = 0.02;
+
+/// The part of the mean square of the error in blocks left out that the answer takes off.
+fn removed(explanation: &Explanation) -> f64 {
+    explanation.fit.heldout.as_ref().map_or(0.0, |steps| {
+        let (with, without) = (steps.augmented.rmse, steps.parameters_only.rmse);
+        1.0 - (with / without.max(f64::MIN_POSITIVE)).powi(2)
+    })
+}
+
+/// Whether an explanation relative to a simulator that is not linear is doubtful: it leaves structure, or its effects explain less
+/// than they leave. Other parameters of the simulator, which a linear model of the difference cannot express, may look like them.
+pub(crate) fn is_doubtful(explanation: &Explanation) -> bool {
+    !explanation.remaining.adequate
+        || match explanation.verdict {
+            Verdict::Unexplained => true,
+            Verdict::Named | Verdict::Family => removed(explanation) < MOST,
+            Verdict::Consistent | Verdict::Parameters => false,
+        }
+}
+
+/// Takes back what is not sure of a doubtful explanation.
+pub(crate) fn doubt(explanation: &mut Explanation) {
+    if !matches!(explanation.verdict, Verdict::Named | Verdict::Family) {
+        return;
+    }
+    let said = if removed(explanation) > 0.0 {
+        explanation.verdict = Verdict::Unexplained;
+        "something is left out, and the following is not sure, because other parameters of the simulator may look like it."
+    } else {
+        explanation.verdict = Verdict::Parameters;
+        explanation.effects.clear();
+        "other parameters explain blocks of the recording that were not fitted as well as the following does."
+    };
+    explanation.summary.insert(
+        0,
+        format!("The simulator is not linear, and no equations were found that reproduce its columns: {said}"),
+    );
+}
+
+/// Error of one explanation's run over that of another, the geometric mean over recordings and outputs; none where they show
+/// different ones. Blocks left out do not compare them: equations run freely over thirds that their fit has not seen, a linear
+/// model over short blocks inside of what was fitted. Few parameters were fitted to the whole, so that it tells enough.
+fn error_over(one: &Explanation, other: &Explanation) -> Option<f64> {
+    let squares = |e: &Explanation| -> Vec<f64> {
+        let mean = |errors: &mut dyn Iterator<Item = f64>| {
+            let known = errors.filter(|e| e.is_finite());
+            let (sum, count) = known.fold((0.0, 0), |(sum, n), e| (sum + e * e, n + 1));
+            sum / f64::from(count.max(1))
+        };
+        let traces = e.signals.iter();
+        traces
+            .map(|t| mean(&mut t.recorded.iter().zip(&t.augmented).map(|(y, s)| y - s)))
+            .collect()
+    };
+    let (ours, theirs) = (squares(one), squares(other));
+    if ours.is_empty() || ours.len() != theirs.len() {
+        return None;
+    }
+    let least = f64::MIN_POSITIVE;
+    let logs = ours.iter().zip(&theirs);
+    let sum: f64 = logs.map(|(a, b)| (a.max(least) / b.max(least)).ln()).sum();
+    Some((0.5 * sum / ours.len() as f64).exp())
+}
+
+/// Whether an explanation by equations that reproduce the columns stands in the place of a doubtful one: parameters of the
+/// simulator are accounted for in it. Its run must follow the recording as closely, and where it leaves structure itself, clearly
+/// closer: it takes at least [`MOST`] off the mean square of the error of the other.
+pub(crate) fn stands_in(equations: &Explanation, doubtful: &Explanation) -> bool {
+    let most = match equations.remaining.adequate {
+        true => 1.0 + EQUAL,
+        false => (1.0 - MOST).sqrt(),
+    };
+    error_over(equations, doubtful).is_some_and(|error| error <= most)
+}
+
+/// Whether two explanations name the same effects. They were found in different ways, so that each confirms the other.
+pub(crate) fn agree(one: &Explanation, other: &Explanation) -> bool {
+    let ids = |e: &Explanation| -> Vec<String> {
+        let mut ids: Vec<String> = e.effects.iter().map(|e| e.effect.clone()).collect();
+        ids.sort_unstable();
+        ids
+    };
+    let named = |e: &Explanation| e.verdict == Verdict::Named;
+    named(one) && named(other) && ids(one) == ids(other)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::columns::tests::drag;
+
+    /// The same explanation, with these errors in blocks left out.
+    fn with_errors(of: &Explanation, without: f64, with: f64, adequate: bool) -> Explanation {
+        let mut e = of.clone();
+        let mut steps = e.fit.train.clone();
+        steps.parameters_only.rmse = without;
+        steps.augmented.rmse = with;
+        e.fit.heldout = Some(steps);
+        e.remaining.adequate = adequate;
+        e
+    }
+
+    #[test]
+    fn the_better_explanation_is_given_and_what_is_not_sure_is_taken_back() {
+        let named = drag();
+        assert!(!is_doubtful(&with_errors(&named, 1.0, 0.5, true)));
+        let judged = |without: f64, with: f64, adequate: bool| {
+            let mut e = with_errors(&named, without, with, adequate);
+            assert!(is_doubtful(&e));
+            doubt(&mut e);
+            (e.verdict, e.effects.len())
+        };
+        assert_eq!(judged(1.0, 0.9, true), (Verdict::Unexplained, 1));
+        assert_eq!(judged(1.0, 1.1, true), (Verdict::Parameters, 0));
+        assert_eq!(judged(1.0, 0.5, false), (Verdict::Unexplained, 1));
+
+        let run = |error: f64, adequate: bool| {
+            let mut e = with_errors(&named, 1.0, 0.8, adequate);
+            for t in &mut e.signals {
+                let errors = t.augmented.iter_mut().zip(&t.recorded);
+                errors.for_each(|(s, y)| *s = y + error * (*s - y));
+            }
+            e
+        };
+        let linear = run(1.0, false);
+        assert!(stands_in(&run(0.9, true), &linear));
+        assert!(!stands_in(&run(1.1, true), &linear));
+        assert!(!stands_in(&run(0.9, false), &linear));
+        assert!(stands_in(&run(0.5, false), &linear));
+
+        assert!(agree(&run(1.1, true), &linear));
+        let mut other = run(1.1, true);
+        other.effects[0].effect = "coulomb_friction".to_owned();
+        assert!(!agree(&other, &linear));
+    }
+}

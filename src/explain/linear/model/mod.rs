@@ -1,0 +1,8 @@
+//! Model.
+
+pub(crate) mod coordinates;
+pub(crate) mod functionals;
+pub(crate) mod linear_plant;
+pub(crate) mod structure;
+pub(crate) mod substeps;
+pub(crate) mod time_stepping;

@@ -1,0 +1,6 @@
+//! Screening.
+
+pub(crate) mod features;
+pub(crate) mod output_adequacy;
+pub(crate) mod score_tests;
+pub(crate) mod templates;

@@ -1,0 +1,36 @@
+//! Drives: what is missing where a free run cannot tell.
+//!
+//! A mass that a force moves against friction integrates. In free run its position drifts away with any error, the more
+//! so when the recording was taken in closed loop, and the free-run error then has a flat valley along which mass,
+//! friction and offset trade against each other. Its equation of motion, averaged over short windows, has none of this:
+//!
+//! ```text
+//! u = M a + d v + F0 + laws(x, v, u)     times a bump, summed over its window, derivatives moved onto the bump
+//! ```
+//!
+//! It is linear in mass, friction and laws, needs no initial state, and feedback does no harm to it. So laws are
+//! chosen there, and the free run only trims the coefficients within what the averaged equation leaves open.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `windows` | bumps, rates, how long the windows must be |
+//! | `regression` | least squares with correlated errors |
+//! | `laws`, `model` | the library as columns; an equation of motion, and the same as a plant |
+//! | `rank` | which law |
+//! | `adequacy` | what is left |
+//! | `tether` | the free run with the averaged equation as prior |
+//! | `inquiry` | when this is the way, and the decision |
+//! | `say` | the numbers in words |
+
+pub(crate) mod correlated_regression;
+pub(crate) mod equation_of_motion;
+pub(crate) mod force_adequacy;
+pub(crate) mod laws;
+pub(crate) mod rank;
+#[cfg(test)]
+mod tests;
+pub(crate) mod tether;
+pub(crate) mod windows;
+
+pub(crate) use super::decision::averaged_decision::{Proof, attempt};
+pub(crate) use correlated_regression::effective;
