@@ -8,11 +8,12 @@ use super::effects::{self, Definition};
 use super::linear::answer::linear_answer::Answer;
 use super::linear::check::Checked;
 use super::linear::data::Data;
+use super::linear::decision::averaged_decision::attempt;
 use super::linear::decision::free_run_decision::{Finding, inquire};
-use super::linear::known_simulation::{Simulation, know};
+use super::linear::known_simulation::know;
 use super::linear::screening::output_adequacy::LEVEL;
-use super::linear::weak_form;
 use super::memory;
+use super::simulation::Simulation;
 use crate::log::Log;
 use crate::noise::Mask;
 
@@ -61,7 +62,7 @@ pub fn explain(
     let recordings = checked.recordings.as_slice();
     let known = know(&checked)?;
     let relative = known.relative;
-    let drive = weak_form::attempt(recordings, &known, &allowed);
+    let drive = attempt(recordings, &known, &allowed);
     // What a law in the averaged equation of a drive explains to noise needs no other way, and the rest little. Where no law
     // was found, the equation may be blind to what there is (effects of the sensor, another mode), and where a spring
     // brings the mass back or a speed is measured, a free run tells as well.

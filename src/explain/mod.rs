@@ -35,6 +35,7 @@ mod explain_recordings;
 mod linear;
 mod memory;
 mod plant_answer;
+mod simulation;
 
 pub use document::explain_error::ExplainError;
 pub use document::explanation::{
@@ -49,7 +50,7 @@ pub use engine::scope::UnknownPlantEffect;
 pub use engine::terms::documentation::{Imitation, PLANT_EFFECTS, PlantEffect, plant_effect};
 pub use explain_recordings::{Options, explain};
 pub use linear::augmented::simulate_augmented::AugmentedError;
-pub use linear::known_simulation::Simulation;
 pub use plant_answer::{
     AugmentedPlantError, Original, PlantOptions, PlantQuestionError, explain_plant,
 };
+pub use simulation::Simulation;

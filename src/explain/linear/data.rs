@@ -88,6 +88,11 @@ pub(super) fn deviation<'a>(values: impl Iterator<Item = &'a f64> + Clone) -> f6
     if variance > 0.0 { variance.sqrt() } else { 1.0 }
 }
 
+/// An input held back by a delay in samples: before it begins, it had its first value.
+pub(crate) fn delayed(u: &[f64], delay: usize) -> Vec<f64> {
+    (0..u.len()).map(|k| u[k.saturating_sub(delay)]).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

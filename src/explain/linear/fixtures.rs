@@ -8,8 +8,9 @@ use rand_distr::StandardNormal;
 
 use super::data::{Data, Segment};
 use super::model::coordinates::Coordinates;
+use super::model::functionals::Signal;
 use super::model::linear_plant::Plant;
-use super::model::structure::{Direction, Instance, Signal, Structure};
+use super::model::structure::{Direction, Instance, Structure};
 use crate::explain::effects;
 
 /// Samples of a recording.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::check::{Checked, INTERPOLATION, between};
-use super::data::{Data, Segment, Series};
+use super::data::{Data, Segment, Series, delayed};
 use super::fit::{Effort, Fit, Problem};
 use super::identification::autoregression::{Simulator, identify_simulator};
 use super::identification::minimal_order::{Simplest, simplest};
@@ -16,19 +16,12 @@ use super::model::time_stepping::MOST_STATES;
 use super::search::single_effects::{Boring, single_effects};
 use crate::explain::document::explain_error::ExplainError;
 use crate::explain::effects::{Action, Definition};
+use crate::explain::linear::model::structure::without_effects::bare;
+use crate::explain::simulation::Simulation;
 use crate::identify::Model;
 use crate::linalg::spectral_radius;
 use crate::log::{Channel, LARGEST_SIZE, Log};
 use crate::noise::Colours;
-
-/// What stands for the simulation.
-#[derive(Debug, Clone)]
-pub enum Simulation {
-    /// A linear model, with the name that messages call it.
-    Model(Box<Model>, String),
-    /// Simulated outputs of any simulator, one log a recording (only its outputs are used).
-    Outputs(Vec<Log>),
-}
 
 /// The simulation as the engine knows it, beside the data in the form that it is compared with.
 #[derive(Debug, Clone)]
@@ -500,32 +493,6 @@ fn learn_nonlinear(
     })
 }
 
-/// A plant without effects in minimal coordinates.
-pub(crate) fn bare(plant: &Plant, initial: &[Vec<f64>]) -> Structure {
-    let coordinates = Arc::new(Coordinates::new(plant));
-    let initial = initial
-        .iter()
-        .map(|x| {
-            (&coordinates.to_here * nalgebra::DVector::from_column_slice(x))
-                .iter()
-                .copied()
-                .collect()
-        })
-        .collect();
-    Structure {
-        coordinates,
-        plant_free: false,
-        initial_free: false,
-        initial,
-        feedthrough_free: false,
-        substeps: 1,
-        recording: None,
-        effects: Vec::new(),
-        known: Vec::new(),
-        adjusted: 0,
-    }
-}
-
 /// Recordings as segments; inputs are held back by their delays (before it begins, an input had its first value).
 fn data_of(recordings: &[Log], delays: &[usize]) -> Data {
     Data {
@@ -547,10 +514,6 @@ fn data_of(recordings: &[Log], delays: &[usize]) -> Data {
         outputs: recordings[0].output_data.len(),
         constant: false,
     }
-}
-
-pub(crate) fn delayed(u: &[f64], delay: usize) -> Vec<f64> {
-    (0..u.len()).map(|k| u[k.saturating_sub(delay)]).collect()
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ pub(crate) mod cascade;
 pub(crate) mod check;
 pub(crate) mod data;
 pub(crate) mod decision;
+pub(crate) mod effective_samples;
 pub(crate) mod fit;
 #[cfg(test)]
 pub(crate) mod fixtures;

@@ -12,6 +12,7 @@ use super::document::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
     FitTable, Location, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
 };
+use super::document::plots::{extremes, spectrum, spectrum_picture};
 use super::document::sentences::{number, quantity};
 use super::engine::fitting::fitted::Fitted;
 use super::engine::holdout::{EXPLAINED, HeldOut, blocks};
@@ -21,8 +22,6 @@ use super::engine::search::Found;
 use super::engine::select::{CHANCE, select};
 use super::engine::terms::library::Port;
 use super::engine::thresholds::{LEFT, SURE, chance};
-use super::linear::answer::linear_answer::extremes;
-use super::linear::answer::regions::{spectrum, spectrum_picture};
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
 use crate::noise::Series;

@@ -6,7 +6,7 @@ use rand_distr::StandardNormal;
 
 use super::*;
 use crate::explain::linear::check::Checked;
-use crate::explain::linear::known_simulation::Simulation;
+use crate::explain::simulation::Simulation;
 use crate::explain::{Explanation, Verdict};
 use crate::log::Log;
 use crate::physics::{Excitation, Point};

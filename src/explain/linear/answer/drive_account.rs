@@ -10,8 +10,8 @@ use crate::explain::document::explanation::{
     EffectFound, Evidence, Mechanics, Quantity, Remaining,
 };
 use crate::explain::document::sentences;
-use crate::explain::linear::decision::averaged_decision::Proof;
-use crate::explain::linear::decision::free_run_decision::NEEDED;
+use crate::explain::linear::search::penalties::NEEDED;
+use crate::explain::linear::weak_form::proof::Proof;
 use crate::explain::linear::weak_form::windows::Reading;
 
 /// Units of angles: what they move is an inertia.

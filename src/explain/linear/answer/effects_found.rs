@@ -9,12 +9,12 @@ use crate::explain::document::explanation::{
 use crate::explain::document::sentences;
 use crate::explain::effects::{self, Action, Port};
 use crate::explain::linear::check::Trouble;
-use crate::explain::linear::decision::free_run_decision::NEEDED;
 use crate::explain::linear::fit::{Fit, Problem};
 use crate::explain::linear::model::functionals::{
-    Functionals, dot, matched_sign, static_equivalent,
+    Functionals, Signal, dot, matched_sign, static_equivalent,
 };
-use crate::explain::linear::model::structure::{Direction, Signal};
+use crate::explain::linear::model::structure::Direction;
+use crate::explain::linear::search::penalties::NEEDED;
 use crate::log::Channel;
 
 impl Answer<'_> {

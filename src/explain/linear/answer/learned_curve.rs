@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::explain::document::explanation::Curve;
 use crate::explain::effects;
 use crate::explain::linear::fit::{Fit, Problem};
-use crate::explain::linear::model::structure::Signal;
+use crate::explain::linear::model::functionals::Signal;
 use crate::explain::linear::screening::score_tests::Bench;
 
 /// Knots of the curve.

@@ -7,15 +7,17 @@ use crate::explain::document::explanation::{
     AugmentedModel, EXPLANATION_FORMAT, EffectSize, Explanation, FitTable, Location, NoiseFound,
     Remaining, SignalTraces, Verdict,
 };
+use crate::explain::document::plots::{extremes, spectrum, spectrum_picture};
 use crate::explain::document::sentences;
 use crate::explain::effects::Port;
 use crate::explain::linear::check::same_factor;
 use crate::explain::linear::data::{Data, Series};
-use crate::explain::linear::decision::free_run_decision::{Finding, NEEDED};
+use crate::explain::linear::decision::free_run_decision::Finding;
 use crate::explain::linear::fit::{Fit, Problem};
 use crate::explain::linear::known_simulation::Known;
 use crate::explain::linear::screening::output_adequacy::adequacy;
 use crate::explain::linear::search::cross_validation;
+use crate::explain::linear::search::penalties::NEEDED;
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
 use crate::noise::Mask;
@@ -330,8 +332,8 @@ impl Answer<'_> {
                 .collect();
             time.sort_by(|a, b| b[2].total_cmp(&a[2]));
         }
-        let before = regions::spectrum(&boring.residual, l, shown, data.sample_time);
-        let after = regions::spectrum(&model.residual, l, shown, data.sample_time);
+        let before = spectrum(&boring.residual, l, shown, data.sample_time);
+        let after = spectrum(&model.residual, l, shown, data.sample_time);
         let port = (!model.structure.new_effects().is_empty()).then(|| {
             match model.structure.new_effects()[0].definition.port() {
                 Port::Input | Port::Path => "input",
@@ -424,8 +426,8 @@ impl Answer<'_> {
                 let series = s * l + o;
                 let shown = extremes(&given.residual[series], TRACE_POINTS);
                 let thin = |v: &[f64]| -> Vec<f64> { shown.iter().map(|k| v[*k]).collect() };
-                let before = regions::spectrum(&boring.residual, l, o, data.sample_time);
-                let after = regions::spectrum(&model.residual, l, o, data.sample_time);
+                let before = spectrum(&boring.residual, l, o, data.sample_time);
+                let after = spectrum(&model.residual, l, o, data.sample_time);
                 // In the units of the recording, also where the engine works relative to a simulator.
                 let skip = ((segment.start_time - self.recordings[s].start_time) / data.sample_time)
                     .round()
@@ -456,7 +458,7 @@ impl Answer<'_> {
                     simulated: back(&given.simulated[series]),
                     parameters_only: back(&self.finding.boring.full.simulated[series]),
                     augmented: back(&model.simulated[series]),
-                    spectrum: regions::spectrum_picture(&before, &after),
+                    spectrum: spectrum_picture(&before, &after),
                 });
             }
         }
@@ -474,50 +476,5 @@ fn probability_text(p: f64) -> String {
             .map_or_else(|_| format!("{p:.3}"), |p| format!("{p}"))
     } else {
         format!("{p:.0e}")
-    }
-}
-
-/// Samples that stand for all, at most about `most`: the smallest and the largest value of each stretch, so that no peak
-/// of the error is lost.
-pub(crate) fn extremes(error: &[f64], most: usize) -> Vec<usize> {
-    if error.len() <= most {
-        return (0..error.len()).collect();
-    }
-    let stretch = error.len().div_ceil(most / 2);
-    let mut shown = Vec::with_capacity(most + 2);
-    for (i, values) in error.chunks(stretch).enumerate() {
-        let place = |better: fn(&f64, &f64) -> bool| {
-            i * stretch
-                + (1..values.len()).fold(0, |best, k| {
-                    if better(&values[k], &values[best]) {
-                        k
-                    } else {
-                        best
-                    }
-                })
-        };
-        let (low, high) = (place(|a, b| a < b), place(|a, b| a > b));
-        shown.push(low.min(high));
-        if low != high {
-            shown.push(low.max(high));
-        }
-    }
-    shown
-}
-
-#[cfg(test)]
-mod tests {
-    use super::extremes;
-
-    #[test]
-    fn thinning_keeps_every_peak() {
-        let mut error: Vec<f64> = (0..100_000).map(|k| (0.01 * f64::from(k)).sin()).collect();
-        error[77_777] = 9.0;
-        error[77_780] = -8.0;
-        let shown = extremes(&error, 1500);
-        assert!(shown.len() <= 1502, "{}", shown.len());
-        assert!(shown.contains(&77_777) && shown.contains(&77_780));
-        assert!(shown.windows(2).all(|pair| pair[0] < pair[1]));
-        assert_eq!(extremes(&error[..10], 1500), (0..10).collect::<Vec<_>>());
     }
 }

@@ -34,8 +34,9 @@
 //! are right.
 
 use crate::explain::document::explanation::{FitTable, Verdict};
-use crate::explain::linear::decision::free_run_decision::{Finding, NEEDED};
+use crate::explain::linear::decision::free_run_decision::Finding;
 use crate::explain::linear::screening::output_adequacy::LEVEL;
+use crate::explain::linear::search::penalties::NEEDED;
 
 /// Evidence below which leads are one.
 const LEAST_LEAD: f64 = 0.1;

@@ -1,6 +1,5 @@
 //! Where recording and simulation differ: in time, frequency and operating region.
 
-use realfft::RealFftPlanner;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use crate::explain::document::explanation::Regime;
@@ -125,50 +124,6 @@ fn trimmed(sums: &[f64], counts: &[f64], from: usize, to: usize) -> (usize, usiz
     best_at
 }
 
-/// Power of a residual over frequency, all series of one output together, Hann window: `(Hz, power)`.
-pub(crate) fn spectrum(
-    residual: &Series,
-    outputs: usize,
-    output: usize,
-    sample_time: f64,
-) -> Vec<(f64, f64)> {
-    let mut total: Vec<(f64, f64)> = Vec::new();
-    for column in residual.iter().skip(output).step_by(outputs) {
-        let n = column.len();
-        if n < 16 || !total.is_empty() && total.len() != n / 2 + 1 {
-            continue;
-        }
-        let mut planner = RealFftPlanner::<f64>::new();
-        let transform = planner.plan_fft_forward(n);
-        let mut windowed: Vec<f64> = column
-            .iter()
-            .enumerate()
-            .map(|(k, v)| {
-                v * (std::f64::consts::PI * (k as f64 + 0.5) / n as f64)
-                    .sin()
-                    .powi(2)
-            })
-            .collect();
-        let mut out = transform.make_output_vec();
-        if transform.process(&mut windowed, &mut out).is_err() {
-            continue;
-        }
-        let scale = sample_time / (0.375 * n as f64);
-        let power = out.iter().map(|v| v.norm_sqr() * scale);
-        if total.is_empty() {
-            total = power
-                .enumerate()
-                .map(|(i, p)| (i as f64 / (n as f64 * sample_time), p))
-                .collect();
-        } else {
-            for (t, p) in total.iter_mut().zip(power) {
-                t.1 += p;
-            }
-        }
-    }
-    total
-}
-
 /// Edges (indices) of logarithmic bands over a spectrum of `bins` bins, each wide enough for a test.
 fn bands(bins: usize) -> Vec<(usize, usize)> {
     let mut edges = Vec::new();
@@ -201,30 +156,6 @@ pub(crate) fn frequencies(before: &[(f64, f64)], after: &[(f64, f64)]) -> Vec<[f
             (db > EXCESS_DB && p * tests < LEVEL).then(|| [before[from].0, before[to - 1].0, db])
         })
         .collect()
-}
-
-/// Thinned spectra for a picture, `[Hz, dB before, dB after]`.
-pub(crate) fn spectrum_picture(before: &[(f64, f64)], after: &[(f64, f64)]) -> Vec<[f64; 3]> {
-    let bins = before.len().min(after.len());
-    let mut picture = Vec::new();
-    let mut from = 1;
-    while from < bins {
-        let to = ((from as f64 * 1.04).ceil() as usize)
-            .max(from + 2)
-            .min(bins);
-        let mean = |s: &[(f64, f64)]| {
-            10.0 * (s[from..to].iter().map(|p| p.1).sum::<f64>() / (to - from) as f64)
-                .max(1e-300)
-                .log10()
-        };
-        picture.push([
-            0.5 * (before[from].0 + before[to - 1].0),
-            mean(before),
-            mean(after),
-        ]);
-        from = to;
-    }
-    picture
 }
 
 /// Sums over the squares of one region.
@@ -348,6 +279,7 @@ pub(crate) fn regimes(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::explain::document::plots::{spectrum, spectrum_picture};
     use crate::explain::linear::data::Segment;
 
     fn data(samples: usize) -> Data {
@@ -563,17 +495,6 @@ mod tests {
         let (sums, counts) = (running(&squares), running(&[1.0; 100]));
         assert_eq!(trimmed(&sums, &counts, 30, 70), (40, 60));
         assert_eq!(trimmed(&sums, &counts, 0, 30), (0, 30));
-    }
-
-    #[test]
-    fn a_picture_stands_at_the_middle_of_its_bins() {
-        let n = 400;
-        let flat: Vec<(f64, f64)> = (0..n).map(|i| (0.01 * i as f64, 1.0)).collect();
-        let picture = spectrum_picture(&flat, &flat);
-        assert!((picture[0][0] - 0.015).abs() < 1e-12, "{:?}", picture[0]);
-        assert!(picture.windows(2).all(|p| p[0][0] < p[1][0]));
-        let last = picture[picture.len() - 1][0];
-        assert!(3.9 < last && last < 3.99, "{last}");
     }
 
     /// Student's t of 1.6740449 with 5.2040960 degrees of freedom, integrated by Simpson's rule.

@@ -6,12 +6,11 @@ use nalgebra::DMatrix;
 
 use crate::explain::document::explanation::{AugmentedModel, ModelEffect, SignalReference};
 use crate::explain::effects::{self, Action};
-use crate::explain::linear::data::Segment;
-use crate::explain::linear::known_simulation::delayed;
+use crate::explain::linear::data::{Segment, delayed};
 use crate::explain::linear::model::coordinates::Coordinates;
-use crate::explain::linear::model::functionals::Functionals;
+use crate::explain::linear::model::functionals::{Functionals, Signal};
 use crate::explain::linear::model::linear_plant::{Plant, row_major};
-use crate::explain::linear::model::structure::{Direction, Instance, Signal, Structure};
+use crate::explain::linear::model::structure::{Direction, Instance, Structure};
 use crate::linalg::Rows;
 use crate::log::{Channel, is_sample_time};
 

@@ -33,7 +33,7 @@ pub(crate) use relation::between;
 use self::relation::Pairs;
 use super::data::{Data, Segment};
 use super::identification::autoregression::identify_simulator;
-use super::known_simulation::Simulation;
+use crate::explain::simulation::Simulation;
 use crate::log::Log;
 use crate::noise::Mask;
 

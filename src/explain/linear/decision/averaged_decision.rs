@@ -1,23 +1,25 @@
 //! When the averaged equation is the way, and what it decides.
 
-use super::free_run_decision::{Finding, NEEDED, Rival};
+use super::free_run_decision::{Finding, Rival};
 use crate::explain::document::explanation::Verdict;
 use crate::explain::effects::Definition;
-use crate::explain::linear::data::{Data, Segment};
+use crate::explain::linear::data::{Data, Segment, delayed};
 use crate::explain::linear::fit::{Fit, Problem};
 use crate::explain::linear::identification::autoregression::initial_states;
-use crate::explain::linear::known_simulation::{Known, bare, delayed};
+use crate::explain::linear::known_simulation::Known;
 use crate::explain::linear::model::linear_plant::Plant;
-use crate::explain::linear::screening::output_adequacy::Adequacy;
+use crate::explain::linear::model::structure::without_effects::bare;
 use crate::explain::linear::search::cross_validation;
 use crate::explain::linear::search::forward_selection::{look_alikes, required};
+use crate::explain::linear::search::penalties::NEEDED;
 use crate::explain::linear::search::single_effects::Boring;
-use crate::explain::linear::weak_form::correlated_regression::Regression;
 use crate::explain::linear::weak_form::equation_of_motion::Equation;
 use crate::explain::linear::weak_form::force_adequacy::{adequacy, holds};
 use crate::explain::linear::weak_form::laws::Form;
+use crate::explain::linear::weak_form::proof::{
+    Proof, as_fit, error_across_halves, halves, inside, tethered,
+};
 use crate::explain::linear::weak_form::rank::{Candidate, best_of, last_law, rank};
-use crate::explain::linear::weak_form::tether::{Tethered, tether};
 use crate::explain::linear::weak_form::windows::{Reading, Windows};
 use crate::log::Log;
 use crate::noise::Mask;
@@ -45,39 +47,6 @@ const PAYS: f64 = 0.9;
 const FORGOTTEN: f64 = 0.1;
 /// Forces that change with the side only: of these a recording hardly tells two apart.
 const SIDES: [&str; 3] = ["coulomb_friction", "stribeck_friction", "input_dead_zone"];
-
-/// What the averaged equation adds to a finding.
-#[derive(Debug, Clone)]
-pub(crate) struct Proof {
-    pub(crate) equation: Equation,
-    pub(crate) tethered: Tethered,
-    /// Decrease of twice the negative log likelihood on held-out windows.
-    pub(crate) heldout_gain: Option<f64>,
-    /// Largest difference of the law's coefficients between the halves, in standard deviations.
-    pub(crate) halves_disagree: Option<f64>,
-    pub(crate) adequacy: Option<Adequacy>,
-    pub(crate) adequate: bool,
-    /// What the little that is left resembles, with its evidence.
-    pub(crate) resembles: Option<(&'static Definition, f64)>,
-    /// Half length of the windows in samples.
-    pub(crate) half: usize,
-    /// Whether a spring brings the mass back well within the recording: it is no drive, and its free run forgets.
-    pub(crate) is_brought_back: bool,
-}
-
-impl Proof {
-    /// Root mean square free-run error of each half of the recordings when the other half is fitted; `None` where a half
-    /// does not determine the coefficients.
-    pub(crate) fn error_across_halves(&self, problem: &Problem) -> Option<f64> {
-        let windows = Windows::choose(problem.data, self.equation.reading)?;
-        error_across_halves(&self.equation, &windows, problem.data, problem)
-    }
-
-    /// Whether any error of a free run adds up: the position of a mass is measured, which no spring brings back.
-    pub(crate) fn drifts(&self) -> bool {
-        self.equation.reading == Reading::Position && !self.is_brought_back
-    }
-}
 
 /// The data whole (not cut to a stretch), with the constant as second input.
 fn whole(recordings: &[Log]) -> Data {
@@ -127,15 +96,6 @@ fn given(known: &Known, data: &Data, problem: &Problem) -> Option<Fit> {
     Some(fit)
 }
 
-/// Windows that lie inside the samples of `mask`.
-fn inside(windows: &Windows, mask: &Mask) -> Windows {
-    windows.only(|s, middle| {
-        mask[s][middle - windows.half..=middle + windows.half]
-            .iter()
-            .all(|keep| *keep)
-    })
-}
-
 /// Mean square error of the acceleration that an equation with given coefficients foretells on other windows.
 fn foretold(
     equation: &Equation,
@@ -181,38 +141,6 @@ fn ranking(
         forms,
         candidates,
     })
-}
-
-/// A fit whose coefficients are tethered to the averaged equation over `mask`.
-fn tethered(
-    equation: &Equation,
-    windows: &Windows,
-    data: &Data,
-    mask: &Mask,
-) -> Option<(Tethered, Regression)> {
-    let regression = equation.fit(windows, data, false)?;
-    let covariance = regression.covariance();
-    let mut fit = tether(
-        equation,
-        data,
-        mask,
-        (regression.coefficients.as_slice(), &covariance),
-        windows.half,
-    )?;
-    // What the sensor's noise takes off mass and friction is an error of them as well, of a size that is known.
-    for (i, share) in windows.attenuation.into_iter().enumerate() {
-        fit.covariance[(i, i)] += (share * fit.coefficients[i]).powi(2);
-    }
-    Some((fit, regression))
-}
-
-fn as_fit(problem: &Problem, equation: &Equation, tethered: &Tethered) -> Option<Fit> {
-    let (structure, theta) = equation.structure(
-        &tethered.coefficients,
-        &tethered.starts,
-        problem.data.sample_time,
-    )?;
-    Fit::at(problem, structure, theta)
 }
 
 /// Root mean square free-run error over the samples of `mask`.
@@ -378,19 +306,6 @@ fn a_mass(candidate: &Candidate) -> bool {
     candidate.regression.coefficients[0].abs() > A_MASS * std
 }
 
-/// Root mean square free-run error of each half of the recordings when `equation` is fitted to the other.
-fn error_across_halves(
-    equation: &Equation,
-    windows: &Windows,
-    data: &Data,
-    problem: &Problem,
-) -> Option<f64> {
-    cross_validation::across_halves(&problem.mask, |own| {
-        let (fit, _) = tethered(equation, &inside(windows, own), data, own)?;
-        Some(as_fit(problem, equation, &fit)?.residual)
-    })
-}
-
 fn finding(
     chosen: &Ranking,
     plain: &Candidate,
@@ -449,8 +364,7 @@ fn finding(
     } else {
         // The simulation may be right as it is: then its free run is as good as any.
         let free = data.residual(&given.simulated);
-        let independent =
-            crate::explain::linear::weak_form::correlated_regression::effective(&free[0]);
+        let independent = crate::explain::linear::effective_samples::effective(&free[0]);
         let ratio = error_over(&given, &problem.mask) / error_over(&linear, &problem.mask);
         if 2.0 * independent * ratio.ln() > NEEDED {
             Verdict::Parameters
@@ -500,28 +414,6 @@ fn finding(
             model
         },
     })
-}
-
-/// Largest difference of the laws' coefficients between the halves of the windows, in standard deviations.
-pub(crate) fn halves(equation: &Equation, windows: &Windows, data: &Data) -> Option<f64> {
-    let n = windows.places.len();
-    let middle = windows.places[n / 2];
-    let half = |first: bool| {
-        equation
-            .fit(
-                &windows.only(|s, k| ((s, k) < middle) == first),
-                data,
-                false,
-            )
-            .map(|r| (r.coefficients.clone(), r.covariance()))
-    };
-    let ((a, p), (b, q)) = (half(true)?, half(false)?);
-    equation
-        .places(false)
-        .into_iter()
-        .flat_map(|(at, count)| at..at + count)
-        .map(|i| (a[i] - b[i]).abs() / (p[(i, i)] + q[(i, i)]).max(1e-300).sqrt())
-        .reduce(f64::max)
 }
 
 /// One line an effect: the best of its forms.

@@ -1,7 +1,7 @@
 //! Decides: consistent, parameters, named, family or unexplained.
 
 use crate::explain::document::explanation::Verdict;
-use crate::explain::effects::{self, Definition, Unit};
+use crate::explain::effects::{self, Definition};
 use crate::explain::linear::check::{Freeze, Trouble, coarse_sensor, frozen};
 use crate::explain::linear::data::{Data, difference};
 use crate::explain::linear::fit::{Effort, Fit, Problem};
@@ -9,43 +9,22 @@ use crate::explain::linear::known_simulation::Known;
 use crate::explain::linear::model::structure::Structure;
 use crate::explain::linear::screening::output_adequacy::{Adequacy, adequacy};
 use crate::explain::linear::search::forward_selection::{
-    self, pair, validated_gain, with_feedthrough,
+    self, pair, polished, validated_gain, with_feedthrough,
 };
-use crate::explain::linear::search::plausibility::{
-    add_free_twins, plant_may_stay, pulls, reaches, sane,
-};
+use crate::explain::linear::search::penalties::{NEEDED, penalty};
+use crate::explain::linear::search::plausibility::{add_free_twins, plant_may_stay, reaches, sane};
 use crate::explain::linear::search::richer_laws::{
     FURTHER, REFINEMENTS, decides_within, derived, finer_steps,
 };
 use crate::explain::linear::search::single_effects::{Boring, Ranked, single_effects};
 use crate::noise::Mask;
 
-/// Places, laws and starting values that are tried on one recording, about: a name among so many needs
-/// `2 ln(300)` more than nothing at all (the maximum of that many chi-squares with one degree of freedom).
-pub(crate) const NEEDED: f64 = 11.4;
 /// Names whose criteria differ by less explain the recording equally well (Kass and Raftery 1995: 6 is "strong").
 const TIE: f64 = crate::explain::document::explanation::EFFECTS_TIE;
-/// A missing resonance imitates any linear misfit; it must lead by this share of its gain.
-const MODE_HANDICAP: f64 = 0.01;
-/// Hysteresis nests dry friction with bristles; it must lead by this share of its gain.
-const DRY_HANDICAP: f64 = 0.01;
-/// A curve without a form must lead the laws that have one by this much, and by this share of its gain (math/physics.md,
-/// fits and decision, 7).
-const CURVE_LEAD: f64 = 12.0;
-const CURVE_HANDICAP: f64 = 0.04;
-/// What an answer owes that physics allows but that is rare, such as a hysteresis that gives energy back: odds of 1
-/// to 400.
-const UNUSUAL: f64 = 12.0;
-/// What each number of a trend or of an integral owes beyond Schwarz's criterion: slow noise makes such columns fit by chance
-/// (Phillips 1986). With a pole at one the squared statistic of a trend has its 1 % point at 15.7 (Dickey and Fuller 1979), not
-/// at 6.6.
-const TREND: f64 = 15.7 - 6.6;
 /// Evidence from which held-out blocks are not asked: they could not say otherwise.
 const BEYOND_DOUBT: f64 = 100.0;
 /// With a larger probability what is left is called noise, and no second effect is looked for.
 const NOTHING_LEFT: f64 = 0.02;
-/// A textbook law is rarely closer to the real one than some percents of what it explains.
-const LAW_IMPERFECTION: f64 = 0.02;
 /// Share from which nothing else is looked for: rounding would be taken for anything.
 const MOSTLY_COARSE: f64 = 0.3;
 
@@ -86,7 +65,7 @@ pub(crate) struct Finding {
         f64,
     )>,
     /// What was decided by the averaged equation of motion.
-    pub(crate) weak: Option<Box<crate::explain::linear::weak_form::Proof>>,
+    pub(crate) weak: Option<Box<crate::explain::linear::weak_form::proof::Proof>>,
 }
 
 impl Finding {
@@ -399,7 +378,7 @@ fn output_error_refit(problem: &Problem) -> Option<Structure> {
     Some(Structure {
         plant_free: true,
         initial_free: true,
-        ..crate::explain::linear::known_simulation::bare(&plant, &initial)
+        ..crate::explain::linear::model::structure::without_effects::bare(&plant, &initial)
     })
 }
 
@@ -435,48 +414,6 @@ fn in_one_recording(problem: &Problem, fit: &Fit) -> Option<Fit> {
 /// likelihood ratio has a standard deviation of `2 sqrt(mean)`, and one true effect in twenty may be lost.
 fn least_heldout(expected: f64) -> f64 {
     (expected - 1.645 * 2.0 * expected.max(0.0).sqrt()).max(0.0)
-}
-
-/// What some effects owe beyond the count of their parameters.
-pub(crate) fn penalty(ranked: &Ranked, base: f64, count: usize) -> f64 {
-    let structure = &ranked.fit.structure;
-    (structure.first_new()..structure.effects.len())
-        .map(|index| owed(ranked, index, base, count))
-        .sum()
-}
-
-/// What effect `index` owes.
-fn owed(ranked: &Ranked, index: usize, base: f64, count: usize) -> f64 {
-    let definition = ranked.fit.structure.effects[index].definition;
-    // A change point is chosen among all samples: it counts about twice (Zhang and Siegmund 2007). So does a frequency,
-    // chosen among all bins (Djuric 1996, 3 ln N for a sinusoid).
-    let searched =
-        definition.changes() || definition.parameters.iter().any(|p| p.unit == Unit::Hertz);
-    let mut owed = if searched { (count as f64).ln() } else { 0.0 };
-    if definition.id == "hysteresis" && pulls(&ranked.fit, index) {
-        owed += UNUSUAL;
-    }
-    let gain = (base - ranked.criterion).max(0.0);
-    owed += match definition.id {
-        "extra_mode" => MODE_HANDICAP * gain,
-        // Nested in a simpler law: it must do better than make up for the imperfection of that law.
-        "stribeck_friction" => LAW_IMPERFECTION * gain,
-        // Hardly to be told from a delay, which every sampled loop has.
-        "actuator_lag" => TIE,
-        "hysteresis" => DRY_HANDICAP * gain,
-        // A curve without a form follows any law; the law is the simpler answer.
-        "law" | "input_curve" => CURVE_LEAD.max(CURVE_HANDICAP * gain),
-        "valve_stiction" => LAW_IMPERFECTION * gain,
-        "sensor_drift" | "state_of_charge" => {
-            let structure = &ranked.fit.structure;
-            let effect = &structure.effects[index];
-            let held = definition.parameters.iter().filter(|p| p.held).count();
-            let numbers = effect.len(structure.states(), structure.outputs()) - held;
-            TREND * numbers as f64
-        }
-        _ => 0.0,
-    };
-    owed
 }
 
 /// For each effect that was fitted: the size in the output at which its evidence would have sufficed. The evidence
@@ -535,11 +472,4 @@ fn rivals(ranked: &[Ranked], base: f64) -> Vec<Rival> {
         }
     }
     list
-}
-
-/// The fit tried harder.
-pub(crate) fn polished(problem: &Problem, fit: &Fit) -> Fit {
-    fit.improved(problem, Effort::FINAL)
-        .filter(|better| better.deviance < fit.deviance)
-        .unwrap_or_else(|| fit.clone())
 }

@@ -10,9 +10,10 @@ use super::steiglitz_mcbride::companion;
 use crate::explain::effects;
 use crate::explain::linear::data::Data;
 use crate::explain::linear::fit::{Effort, Fit, Problem};
-use crate::explain::linear::known_simulation::bare;
+use crate::explain::linear::model::functionals::Signal;
 use crate::explain::linear::model::linear_plant::Plant;
-use crate::explain::linear::model::structure::{Direction, Instance, Signal, Structure};
+use crate::explain::linear::model::structure::without_effects::bare;
+use crate::explain::linear::model::structure::{Direction, Instance, Structure};
 use crate::linalg::least_squares;
 use crate::noise::Colours;
 

@@ -195,7 +195,7 @@ pub(crate) fn shifted(data: &Data, delay: usize) -> Data {
             .iter()
             .map(|s| {
                 let mut inputs = s.inputs.clone();
-                inputs[0] = crate::explain::linear::known_simulation::delayed(&s.inputs[0], delay);
+                inputs[0] = crate::explain::linear::data::delayed(&s.inputs[0], delay);
                 Segment {
                     inputs,
                     ..s.clone()

@@ -2,9 +2,19 @@
 
 use std::sync::OnceLock;
 
-use super::coordinates::Derivatives;
+use super::continuous::Derivatives;
 use super::linear_plant::Plant;
-use super::structure::Signal;
+
+/// The position and rate that a force looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Signal {
+    /// An output is the position, its derivative the rate.
+    Output(usize),
+    /// An output is the rate: its integral is the position.
+    Integral(usize),
+    /// Position of one output relative to another.
+    Difference(usize, usize),
+}
 
 /// Rows of a position, its rate, and what inputs add to the rate directly.
 #[derive(Debug, Clone)]

@@ -1,5 +1,6 @@
 //! Model.
 
+pub(crate) mod continuous;
 pub(crate) mod coordinates;
 pub(crate) mod functionals;
 pub(crate) mod linear_plant;

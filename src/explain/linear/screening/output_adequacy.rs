@@ -186,7 +186,7 @@ fn structure_of_error(problem: &Problem, fit: &Fit) -> Option<f64> {
     let independent = fit
         .residual
         .iter()
-        .map(|e| crate::explain::linear::weak_form::effective(e))
+        .map(|e| crate::explain::linear::effective_samples::effective(e))
         .sum::<f64>();
     let chance = features as f64 / independent.max(1.0);
     Some((gained / left - chance).clamp(0.0, 1.0))

@@ -10,9 +10,9 @@ use nalgebra::{DMatrix, DVector};
 use crate::explain::effects::{self, Action, Clock, Definition, Sense};
 use crate::explain::linear::data::{Data, Series};
 use crate::explain::linear::fit::{Fit, Problem};
-use crate::explain::linear::model::functionals::{Functionals, dot, matched_sign};
+use crate::explain::linear::model::functionals::{Functionals, Signal, dot, matched_sign};
 use crate::explain::linear::model::linear_plant::Plant;
-use crate::explain::linear::model::structure::{Direction, Instance, Signal, Structure};
+use crate::explain::linear::model::structure::{Direction, Instance, Structure};
 use crate::explain::linear::model::time_stepping::{Grid, run};
 use crate::linalg::multiply_tn;
 use crate::noise::Noise;
@@ -137,11 +137,7 @@ impl<'a> Bench<'a> {
             nuisance: DMatrix::zeros(rows, 0),
             nuisance_inverse: DMatrix::zeros(0, 0),
             left: 0.0,
-            slopes: crate::explain::linear::search::rectified_sensor::signs(
-                &basis.structure,
-                &basis.theta,
-                problem.data,
-            ),
+            slopes: super::rectified_signs::signs(&basis.structure, &basis.theta, problem.data),
         };
         let mut flat: Vec<f64> = Vec::new();
         let mut count = 0;

@@ -3,9 +3,10 @@
 use super::score_tests::{Bench, Signals, Template};
 use crate::explain::effects::{self, Action, CHARGE_ORDERS, Definition, Motion, Needs, Observed};
 use crate::explain::linear::data::Series;
+use crate::explain::linear::model::functionals::Signal;
 use crate::explain::linear::model::linear_plant::Plant;
 use crate::explain::linear::model::structure::{
-    Direction, Instance, Signal, add_charge, add_mode, add_sine,
+    Direction, Instance, add_charge, add_mode, add_sine,
 };
 use crate::explain::linear::model::time_stepping::{Grid, run};
 
@@ -121,7 +122,7 @@ impl Bench<'_> {
             .collect();
         let observed = self.observed(channel, Vec::new(), &[]);
         let b = self.plant.b_column(input);
-        let within = crate::explain::linear::model::coordinates::moment_columns(&self.plant)
+        let within = crate::explain::linear::model::continuous::moment_columns(&self.plant)
             .swap_remove(input);
         (definition.starts)(&observed)
             .into_iter()

@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
+use super::penalties::penalty;
 use super::plausibility::sane;
 use super::richer_laws::{REFINEMENTS, derived};
 use super::single_effects::{Ranked, second_effects};
 use crate::explain::effects::Definition;
 use crate::explain::linear::data::Series;
-use crate::explain::linear::decision::free_run_decision::{penalty, polished};
 use crate::explain::linear::fit::{Effort, Fit, Problem};
 use crate::noise::{Colours, Noise};
 
@@ -243,6 +243,13 @@ pub(crate) fn look_alikes(a: &str, b: &str) -> bool {
     KINDS
         .iter()
         .any(|kind| kind.contains(&a) && kind.contains(&b))
+}
+
+/// The fit tried harder.
+pub(crate) fn polished(problem: &Problem, fit: &Fit) -> Fit {
+    fit.improved(problem, Effort::FINAL)
+        .filter(|better| better.deviance < fit.deviance)
+        .unwrap_or_else(|| fit.clone())
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 pub(crate) mod cross_validation;
 pub(crate) mod forward_selection;
+pub(crate) mod penalties;
 pub(crate) mod plausibility;
 pub(crate) mod rectified_sensor;
 pub(crate) mod richer_laws;

@@ -8,13 +8,12 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::penalties::{NEEDED, penalty};
 use super::single_effects::{Boring, Ranked};
 use crate::explain::effects::{self, Action, Sense, Unit};
-use crate::explain::linear::decision::free_run_decision::{NEEDED, penalty};
 use crate::explain::linear::fit::{Effort, Fit, Problem};
 use crate::explain::linear::identification::step_response_test::Uncertainty;
-use crate::explain::linear::model::functionals::{Functionals, dot};
-use crate::explain::linear::model::structure::Signal;
+use crate::explain::linear::model::functionals::{Functionals, Signal, dot};
 
 /// Probability of a larger difference when the plant is as it was given.
 const SAME_PLANT: f64 = 1e-3;

@@ -16,9 +16,10 @@ use crate::explain::effects::{self, Definition};
 use crate::explain::linear::data::{Data, Series};
 use crate::explain::linear::fit::{Effort, Fit, Problem};
 use crate::explain::linear::identification::steiglitz_mcbride::of_order;
-use crate::explain::linear::known_simulation::bare;
+use crate::explain::linear::model::functionals::Signal;
 use crate::explain::linear::model::linear_plant::Plant;
-use crate::explain::linear::model::structure::{Direction, Instance, Signal, Structure};
+use crate::explain::linear::model::structure::without_effects::bare;
+use crate::explain::linear::model::structure::{Direction, Instance, Structure};
 use crate::linalg::spectral_radius;
 
 /// Times a reading must come down to zero for its sign to be asked for: once or twice is a beginning, or an end.
@@ -76,41 +77,6 @@ pub(crate) fn applies(data: &Data) -> bool {
         })
         .sum();
     visits >= VISITS
-}
-
-/// Sign of what is in front of a rectifying sensor, where `structure` has one: what a change there is multiplied by.
-pub(crate) fn signs(structure: &Structure, theta: &[f64], data: &Data) -> Option<Series> {
-    let index = structure
-        .effects
-        .iter()
-        .position(|e| e.definition.id == "sensor_rectification")?;
-    let channel = structure.effects[index].channel;
-    // It has no numbers, so that `theta` serves without it as well.
-    let mut before = structure.clone();
-    before.effects.remove(index);
-    if index < before.known.len() {
-        before.known.remove(index);
-    } else if index < structure.first_new() {
-        before.adjusted -= 1;
-    }
-    let signed = before.simulate(theta, data)?;
-    Some(
-        signed
-            .iter()
-            .enumerate()
-            .map(|(s, y)| {
-                y.iter()
-                    .map(|y| {
-                        if s % data.outputs == channel && *y < 0.0 {
-                            -1.0
-                        } else {
-                            1.0
-                        }
-                    })
-                    .collect()
-            })
-            .collect(),
-    )
 }
 
 /// Plants behind a rectifying sensor, alone and with one law each, fitted like any other explanation.

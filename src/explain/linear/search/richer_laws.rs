@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
+use super::penalties::NEEDED;
 use super::plausibility::{speed_scale, travel};
 use super::single_effects::Ranked;
 use crate::explain::effects::{self, Definition};
-use crate::explain::linear::decision::free_run_decision::NEEDED;
 use crate::explain::linear::fit::{Effort, Fit, Problem};
 use crate::explain::linear::model::structure::Structure;
 

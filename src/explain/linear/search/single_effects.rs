@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use crate::explain::effects::{self, Definition, Unit};
 use crate::explain::linear::fit::{Effort, Fit, Problem};
-use crate::explain::linear::model::functionals::Functionals;
-use crate::explain::linear::model::structure::{Direction, Instance, Signal, Structure};
+use crate::explain::linear::model::functionals::{Functionals, Signal};
+use crate::explain::linear::model::structure::{Direction, Instance, Structure};
 use crate::explain::linear::screening::score_tests::{Lead, extended, screen};
 use crate::noise::Noise;
 

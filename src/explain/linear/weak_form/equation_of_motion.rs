@@ -9,8 +9,9 @@ use super::laws::Form;
 use super::windows::{Reading, Windows};
 use crate::explain::linear::data::Data;
 use crate::explain::linear::model::coordinates::Coordinates;
+use crate::explain::linear::model::functionals::Signal;
 use crate::explain::linear::model::linear_plant::{Plant, row_major};
-use crate::explain::linear::model::structure::{Direction, Instance, Signal, Structure};
+use crate::explain::linear::model::structure::{Direction, Instance, Structure};
 use crate::linalg::exponential;
 
 /// `u = M a + d v + F0 [+ k x] + laws`.

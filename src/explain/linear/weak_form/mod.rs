@@ -26,11 +26,9 @@ pub(crate) mod correlated_regression;
 pub(crate) mod equation_of_motion;
 pub(crate) mod force_adequacy;
 pub(crate) mod laws;
+pub(crate) mod proof;
 pub(crate) mod rank;
 #[cfg(test)]
 mod tests;
 pub(crate) mod tether;
 pub(crate) mod windows;
-
-pub(crate) use super::decision::averaged_decision::{Proof, attempt};
-pub(crate) use correlated_regression::effective;

@@ -7,10 +7,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::correlated_regression::effective;
 use super::equation_of_motion::Equation;
 use super::windows::Reading;
 use crate::explain::linear::data::{Data, Series};
+use crate::explain::linear::effective_samples::effective;
 use crate::noise::Mask;
 
 /// Rounds in which the weight of the free run is taken anew, and steps of each.

@@ -3,7 +3,7 @@
 
 use crate::explain::effects::{CHARGE_ORDERS, Clock, charge};
 use crate::explain::linear::data::Series;
-use crate::explain::linear::model::coordinates::moment_columns;
+use crate::explain::linear::model::continuous::moment_columns;
 use crate::explain::linear::model::linear_plant::Plant;
 
 /// The plant with the moments of its inputs as further inputs: all first ones, then all second ones.

@@ -5,31 +5,22 @@
 //! logarithms.
 
 mod added;
+pub(crate) mod tank_simulation;
 #[cfg(test)]
 mod tests;
+pub(crate) mod without_effects;
 
 use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::coordinates::Coordinates;
-use super::functionals::{Functionals, dot, matched_sign};
+use super::functionals::{Functionals, Signal, dot, matched_sign};
 use super::linear_plant::Plant;
 use super::substeps::Finer;
 use super::time_stepping::{ActiveForce, Grid, run};
 use crate::explain::effects::{Action, CHARGE_ORDERS, Clock, Definition, Moments, Needs};
 use crate::explain::linear::data::{Data, Segment, Series};
 pub(crate) use added::{add_charge, add_mode, add_sine, with_moments};
-
-/// The position and rate that a force looks at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Signal {
-    /// An output is the position, its derivative the rate.
-    Output(usize),
-    /// An output is the rate: its integral is the position.
-    Integral(usize),
-    /// Position of one output relative to another.
-    Difference(usize, usize),
-}
 
 /// How a force enters the state equation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -520,9 +511,7 @@ impl Structure {
         }
         let samples = segment.samples();
         let mut outputs = if self.is_tanks() {
-            crate::explain::linear::search::tank_candidates::simulate(
-                self, theta, &inputs, x0, clock,
-            )?
+            self::tank_simulation::simulate(self, theta, &inputs, x0, clock)?
         } else if let Some(finer) = &prepared.finer {
             finer.run(&with_paths, forces, x0, &inputs, samples, clock)?
         } else {

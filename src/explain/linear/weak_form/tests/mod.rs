@@ -8,9 +8,9 @@ use rayon::prelude::*;
 use super::equation_of_motion::Equation;
 use super::force_adequacy::adequacy;
 use super::laws::Form;
+use super::proof::halves;
 use super::windows::{Reading, Windows};
 use crate::explain::linear::data::{Data, Segment};
-use crate::explain::linear::decision::averaged_decision::halves;
 use crate::explain::linear::model::structure::Structure;
 use crate::explain::linear::screening::output_adequacy::Adequacy;
 

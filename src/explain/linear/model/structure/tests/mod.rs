@@ -2,7 +2,7 @@ use approx::assert_abs_diff_eq;
 
 use super::*;
 use crate::explain::effects;
-use crate::explain::linear::model::coordinates::moment_columns;
+use crate::explain::linear::model::continuous::moment_columns;
 
 const N: usize = 60;
 const STEP: f64 = 0.1;
