@@ -9,22 +9,19 @@
 //! simulation ─┘  plant + known effects └── screen ── fit effects, singly, pairs ┘
 //! ```
 //!
-//! | file | what it holds |
+//! There are two engines: one for simulations that are linear models or columns of outputs, one for plants in equations.
+//!
+//! | folder or file | what it holds |
 //! |---|---|
-//! | `simulation`, `baseline`, `offset`, `rebaseline` | the simulation as a model, also from a column of its outputs |
-//! | `coordinates`, `plant`, `structure`, `functionals`, `run`, `finer` | the augmented model: numbers, effects, the recursion |
-//! | `effects` | the library, one file a family |
-//! | `noise`, `fit` | coloured, heavy-tailed noise; Levenberg and Marquardt |
-//! | `screen`, `templates`, `features` | one Gauss-Newton step for everything |
-//! | `cascade`, `tanks`, `rectified` | plants of another class, which no effect added to the linear one becomes |
-//! | `search`, `refine`, `plausible`, `second`, `inquiry` | the fits, what is kept of them, the decision |
-//! | `weak` | drives: the averaged equation of motion, where a free run cannot tell |
-//! | `question`, `memory` | which ways are gone and which of them speaks; what that takes of the memory |
-//! | `check` | the data before the physics: dropouts, outliers, wraps, clocks, signs, units, exchanged outputs, a stuck sensor |
-//! | `adequacy` | tests of what is left |
-//! | `locate`, `curve`, `prove`, `probability` | where, the law without a form, held-out blocks, how sure |
-//! | `engine`, `plant_answer` | simulations that are plants in equations: terms at places of the equations, and what is said |
-//! | `answer`, `account`, `words`, `explanation`, `augmented`, `start` | what is said, and the model that can be run |
+//! | `explain_recordings` | the question about a linear model or columns: which ways of answering it are taken |
+//! | `simulation`, `memory` | the simulation as the caller gives it; the memory that a question takes |
+//! | `effects` | the library of the linear engine, one file a family |
+//! | `linear` | the linear engine: from the checks of the data to the answer |
+//! | `engine` | the engine for plants in equations: terms at places of the equations |
+//! | `plant_answer` | the question about a plant in equations, and its answer |
+//! | `columns` | equations that reproduce columns of outputs, for the engine of plants in equations |
+//! | `compare_explanations` | the choice between the answers of both engines, for columns |
+//! | `document` | the explanation as a document, its sentences, units and errors |
 
 mod columns;
 mod compare_explanations;

@@ -177,7 +177,7 @@ pub(crate) enum Action {
     MissingPath,
     /// A curve of the integral of an input, added to the outputs.
     Charge,
-    /// Part of a plant of another class, which is run in place of the linear one (`tanks`).
+    /// Part of a plant of another class, which is run in place of the linear one (`tank_simulation`).
     Process,
     /// Found by an exact test; in the model it is a sensor law without effect on fits.
     Exact,
@@ -302,7 +302,7 @@ pub fn library() -> impl Iterator<Item = &'static Definition> {
     .flatten()
 }
 
-/// The entry with this id and variant, also of what is not physics but a number (`linear`).
+/// The entry with this id and variant, also of what is not physics but a number (`wrong_parameters`).
 pub(crate) fn find(id: &str, variant: &str) -> Option<&'static Definition> {
     library()
         .chain(wrong_parameters::ENTRIES)

@@ -1,12 +1,12 @@
 //! The answer where the simulation is a plant in equations.
 
-mod effects;
 mod hypotheses;
+mod plant_effects;
 mod question;
-mod simulate;
+mod simulate_explained;
 
 pub use question::{PlantOptions, PlantQuestionError};
-pub use simulate::{AugmentedPlantError, Original};
+pub use simulate_explained::{AugmentedPlantError, Original};
 
 use super::document::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,

@@ -11,8 +11,8 @@
 //! | `wrap` | an angle that starts again each turn |
 //! | `relation` | exchanged outputs, another sign, another unit |
 //! | `clock`, `rates` | clocks of different rates, and other parameters that a clock would make |
-//! | `frozen`, `lattice` | a sensor that holds its value, a coarse one |
-//! | `words` | what is said of it |
+//! | `frozen_sensor`, `coarse_sensor` | a sensor that holds its value, a coarse one |
+//! | `trouble_sentences` | what is said of it |
 
 mod clock;
 mod coarse_sensor;

@@ -11,8 +11,8 @@ use crate::explain::linear::model::linear_plant::Plant;
 use crate::explain::linear::model::structure::without_effects::bare;
 use crate::explain::linear::search::cross_validation;
 use crate::explain::linear::search::forward_selection::{look_alikes, required};
+use crate::explain::linear::search::null_models::Boring;
 use crate::explain::linear::search::penalties::NEEDED;
-use crate::explain::linear::search::single_effects::Boring;
 use crate::explain::linear::weak_form::equation_of_motion::Equation;
 use crate::explain::linear::weak_form::force_adequacy::{adequacy, holds};
 use crate::explain::linear::weak_form::laws::Form;
@@ -38,7 +38,7 @@ const LAW_IMPERFECTION: f64 = 0.02;
 /// The free run may be worse than that of the simulation by this factor, for rounding.
 const NO_WORSE: f64 = 1.02;
 /// A second law is looked for only where the first leaves more than a textbook law does of a real drive
-/// (`adequacy::IMPERFECTION`), and it must lower the squared free-run error of the half that was not fitted to this
+/// (`force_adequacy::IMPERFECTION`), and it must lower the squared free-run error of the half that was not fitted to this
 /// share: the averaged equation sees forces of a hundredth of the largest, and a law that does not show in free run is
 /// no explanation.
 const PAYS: f64 = 0.9;

@@ -2,7 +2,8 @@
 
 use crate::explain::document::explanation::Verdict;
 use crate::explain::effects::{self, Definition};
-use crate::explain::linear::check::{Freeze, Trouble, coarse_sensor, frozen};
+use crate::explain::linear::check::coarse_sensor;
+use crate::explain::linear::check::{Freeze, Trouble, frozen};
 use crate::explain::linear::data::{Data, difference};
 use crate::explain::linear::fit::{Effort, Fit, Problem};
 use crate::explain::linear::known_simulation::Known;
@@ -11,12 +12,13 @@ use crate::explain::linear::screening::output_adequacy::{Adequacy, adequacy};
 use crate::explain::linear::search::forward_selection::{
     self, pair, polished, validated_gain, with_feedthrough,
 };
+use crate::explain::linear::search::null_models::Boring;
 use crate::explain::linear::search::penalties::{NEEDED, penalty};
 use crate::explain::linear::search::plausibility::{add_free_twins, plant_may_stay, reaches, sane};
 use crate::explain::linear::search::richer_laws::{
     FURTHER, REFINEMENTS, decides_within, derived, finer_steps,
 };
-use crate::explain::linear::search::single_effects::{Boring, Ranked, single_effects};
+use crate::explain::linear::search::single_effects::{Ranked, single_effects};
 use crate::noise::Mask;
 
 /// Names whose criteria differ by less explain the recording equally well (Kass and Raftery 1995: 6 is "strong").

@@ -1,9 +1,10 @@
 //! What a named effect needs beyond the null model, and what some effects owe beyond BIC.
 
-use super::plausibility::pulls;
 use super::single_effects::Ranked;
 use crate::explain::document::explanation::EFFECTS_TIE;
 use crate::explain::effects::Unit;
+use crate::explain::linear::fit::Fit;
+use crate::explain::linear::model::functionals::{Functionals, dot};
 
 /// Places, laws and starting values that are tried on one recording, about: a name among so many needs
 /// `2 ln(300)` more than nothing at all (the maximum of that many chi-squares with one degree of freedom).
@@ -72,4 +73,13 @@ fn owed(ranked: &Ranked, index: usize, base: f64, count: usize) -> f64 {
         _ => 0.0,
     };
     owed
+}
+
+/// Whether force `index` acts against its usual sense.
+pub(crate) fn pulls(fit: &Fit, index: usize) -> bool {
+    let plant = fit.structure.plant(&fit.theta);
+    let rows = Functionals::new(&plant);
+    let signal = rows.of(&plant, fit.structure.effects[index].signal);
+    let direction = fit.structure.direction(&fit.theta, &plant, &rows, index);
+    dot(&signal.forward, &direction) < 0.0
 }

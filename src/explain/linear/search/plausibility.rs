@@ -8,8 +8,9 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::null_models::Boring;
 use super::penalties::{NEEDED, penalty};
-use super::single_effects::{Boring, Ranked};
+use super::single_effects::Ranked;
 use crate::explain::effects::{self, Action, Sense, Unit};
 use crate::explain::linear::fit::{Effort, Fit, Problem};
 use crate::explain::linear::identification::step_response_test::Uncertainty;
@@ -59,15 +60,6 @@ pub(crate) fn speed_scale(problem: &Problem, fit: &Fit, index: usize) -> f64 {
         Signal::Output(o) | Signal::Integral(o) | Signal::Difference(o, _) => o,
     };
     effects::level(&size(output), 0.8, f64::abs).max(1e-12)
-}
-
-/// Whether force `index` acts against its usual sense.
-pub(crate) fn pulls(fit: &Fit, index: usize) -> bool {
-    let plant = fit.structure.plant(&fit.theta);
-    let rows = Functionals::new(&plant);
-    let signal = rows.of(&plant, fit.structure.effects[index].signal);
-    let direction = fit.structure.direction(&fit.theta, &plant, &rows, index);
-    dot(&signal.forward, &direction) < 0.0
 }
 
 /// An effect fitted beside the given plant stands only while a free plant does not do significantly better with the

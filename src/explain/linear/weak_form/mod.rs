@@ -14,13 +14,14 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `windows` | bumps, rates, how long the windows must be |
-//! | `regression` | least squares with correlated errors |
-//! | `laws`, `model` | the library as columns; an equation of motion, and the same as a plant |
+//! | `correlated_regression` | least squares with correlated errors |
+//! | `laws`, `equation_of_motion` | the library as columns; an equation of motion, and the same as a plant |
 //! | `rank` | which law |
-//! | `adequacy` | what is left |
+//! | `force_adequacy` | the test of the residual force |
 //! | `tether` | the free run with the averaged equation as prior |
-//! | `inquiry` | when this is the way, and the decision |
-//! | `say` | the numbers in words |
+//! | `proof` | the tethered fit, its errors across halves, what it adds to a decision |
+//!
+//! When this is the way, and what it decides, is said in [`averaged_decision`](super::decision::averaged_decision).
 
 pub(crate) mod correlated_regression;
 pub(crate) mod equation_of_motion;

@@ -5,6 +5,7 @@ use crate::explain::linear::fixtures::{self, SAMPLE_TIME, SAMPLES, effect, recor
 use crate::explain::linear::model::coordinates::Coordinates;
 use crate::explain::linear::model::linear_plant::Plant;
 use crate::explain::linear::model::structure::{Instance, Structure};
+use crate::explain::linear::search::penalties::pulls;
 
 /// Seconds of a recording.
 const LENGTH: f64 = SAMPLES as f64 * SAMPLE_TIME;
