@@ -1,6 +1,6 @@
 //! Which of two explanations of simulated columns is given, and what is taken back where the simulator is not understood.
 
-use super::document::explanation::{Explanation, Verdict};
+use super::explanation::{Explanation, Verdict};
 
 /// An effect beside a simulator that is neither linear nor reproduced by equations must take this part off the mean square of the
 /// error in blocks left out: more is explained than is not.

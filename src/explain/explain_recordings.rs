@@ -3,13 +3,13 @@
 use super::columns;
 use super::compare_explanations::{agree, doubt, is_doubtful, stands_in};
 use super::document::explain_error::ExplainError;
-use super::document::explanation::{Explanation, Verdict};
 use super::effects::{self, Definition};
+use super::explanation::{Explanation, Verdict};
 use super::linear::answer::linear_answer::Answer;
 use super::linear::check::Checked;
 use super::linear::data::Data;
 use super::linear::decision::averaged_decision::attempt;
-use super::linear::decision::free_run_decision::{Finding, inquire};
+use super::linear::decision::output_error_decision::{Finding, inquire};
 use super::linear::known_simulation::know;
 use super::linear::screening::output_adequacy::LEVEL;
 use super::memory;

@@ -21,7 +21,8 @@
 //! | `plant_answer` | the question about a plant in equations, and its answer |
 //! | `columns` | equations that reproduce columns of outputs, for the engine of plants in equations |
 //! | `compare_explanations` | the choice between the answers of both engines, for columns |
-//! | `document` | the explanation as a document, its sentences, units and errors |
+//! | `explanation` | the explanation as a document (`innovant-explanation/1`): its types |
+//! | `document` | its sentences, plots, units and errors |
 
 mod columns;
 mod compare_explanations;
@@ -29,23 +30,24 @@ mod document;
 pub(crate) mod effects;
 mod engine;
 mod explain_recordings;
+mod explanation;
 mod linear;
 mod memory;
 mod plant_answer;
 mod simulation;
 
 pub use document::explain_error::ExplainError;
-pub use document::explanation::{
+pub use engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
+pub use engine::scope::UnknownPlantEffect;
+pub use engine::terms::documentation::{Imitation, PLANT_EFFECTS, PlantEffect, plant_effect};
+pub use explain_recordings::{Options, explain};
+pub use explanation::{
     Alternative, AugmentedModel, AugmentedPlant, Curve, Detectable, EXPLANATION_FORMAT,
     EffectFound, EffectSize, EquationMap, Evidence, Explanation, FitFigure, FitSteps, FitTable,
     HypothesisFit, HypothesisFound, HypothesisRival, HypothesisVerdict, Law, Location, Mechanics,
     ModelEffect, NoiseFound, ParameterChange, Quantity, Regime, Remaining, SignalReference,
     SignalTraces, StatePrior, Verdict,
 };
-pub use engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
-pub use engine::scope::UnknownPlantEffect;
-pub use engine::terms::documentation::{Imitation, PLANT_EFFECTS, PlantEffect, plant_effect};
-pub use explain_recordings::{Options, explain};
 pub use linear::augmented::simulate_augmented::AugmentedError;
 pub use plant_answer::{
     AugmentedPlantError, Original, PlantOptions, PlantQuestionError, explain_plant,

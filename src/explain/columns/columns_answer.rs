@@ -1,8 +1,8 @@
 //! The answer where a simulation is known by its outputs, and equations reproduce them.
 
 use super::{Question, USEFUL, reproduce};
-use crate::explain::document::explanation::Explanation;
 use crate::explain::engine::terms::documentation::plant_effect;
+use crate::explain::explanation::Explanation;
 use crate::explain::linear::check::Checked;
 use crate::explain::plant_answer::{PlantOptions, explain_plant};
 use crate::explain::simulation::Simulation;

@@ -1,7 +1,7 @@
 //! Units, sentences and summaries.
 
-use super::explanation::{EFFECTS_TIE, EffectFound, Explanation, Quantity, Verdict};
 use crate::explain::effects::{Definition, Port, Unit};
+use crate::explain::explanation::{EFFECTS_TIE, EffectFound, Explanation, Quantity, Verdict};
 use crate::log::Channel;
 
 /// Unit of a parameter, as far as the channels' units tell.

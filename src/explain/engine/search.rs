@@ -12,7 +12,7 @@ use super::step::{Stage, Step, improved, step};
 use super::terms::library::Needs;
 use super::terms::names::named;
 use super::thresholds::{BETTER_FITS, FINISHED, MOST, NEEDED, SECOND};
-use crate::explain::document::explanation::EquationMap;
+use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{EstimateError, EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, Plant};
 

@@ -16,7 +16,7 @@ use super::thresholds::{
     AT_A_PLACE, BETTER, COMPARED, FINISHED, FITTED, FORETOLD, GLANCE, GLANCED, GLANCED_ACCURACY,
     GLANCED_STEPS, IMITATED, LEFT, MOST, MOST_STEPS, NEEDED, OF_A_KIND, THOROUGH, chance,
 };
-use crate::explain::document::explanation::EquationMap;
+use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{ModelSpec, Plant};
 

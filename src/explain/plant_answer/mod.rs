@@ -8,10 +8,6 @@ mod simulate_explained;
 pub use question::{PlantOptions, PlantQuestionError};
 pub use simulate_explained::{AugmentedPlantError, Original};
 
-use super::document::explanation::{
-    AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
-    FitTable, Location, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
-};
 use super::document::plots::{extremes, spectrum, spectrum_picture};
 use super::document::sentences::{number, quantity};
 use super::engine::fitting::fitted::Fitted;
@@ -22,6 +18,10 @@ use super::engine::search::Found;
 use super::engine::select::{CHANCE, select};
 use super::engine::terms::library::Port;
 use super::engine::thresholds::{LEFT, SURE, chance};
+use super::explanation::{
+    AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
+    FitTable, Location, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
+};
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
 use crate::noise::Series;

@@ -3,15 +3,13 @@
 use std::collections::BTreeMap;
 
 use super::Answer;
-use crate::explain::document::explanation::{
-    Alternative, EffectFound, Evidence, Law, Quantity, Verdict,
-};
 use crate::explain::engine::fitting::edit::{Place, user_of};
 use crate::explain::engine::fitting::fitted::Fitted;
 use crate::explain::engine::screening::curve::piece;
 use crate::explain::engine::terms::library::Port;
 use crate::explain::engine::terms::values::filled;
 use crate::explain::engine::thresholds::NEEDED;
+use crate::explain::explanation::{Alternative, EffectFound, Evidence, Law, Quantity, Verdict};
 use crate::physics::{Excitation, Hold, Plant, VariableId, parse};
 
 /// Points of a law.

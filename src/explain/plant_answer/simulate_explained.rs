@@ -1,6 +1,6 @@
 //! An explained plant on another input.
 
-use crate::explain::document::explanation::AugmentedPlant;
+use crate::explain::explanation::AugmentedPlant;
 use crate::log::Log;
 use crate::physics::estimate::{EstimateError, EstimateOptions, Form, PlantRecording, estimate};
 use crate::physics::{Excitation, Hold, Plant, Point, SimulationError, parse};

@@ -6,12 +6,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::effects_found::{amplitude_name, amplitude_unit, port_name};
 use super::linear_answer::Answer;
-use crate::explain::document::explanation::{
-    EffectFound, Evidence, Mechanics, Quantity, Remaining,
-};
 use crate::explain::document::sentences;
+use crate::explain::explanation::{EffectFound, Evidence, Mechanics, Quantity, Remaining};
 use crate::explain::linear::search::penalties::NEEDED;
-use crate::explain::linear::weak_form::proof::Proof;
+use crate::explain::linear::weak_form::equation_proof::Proof;
 use crate::explain::linear::weak_form::windows::Reading;
 
 /// Units of angles: what they move is an inertia.

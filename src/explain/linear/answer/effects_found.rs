@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::linear_answer::Answer;
-use crate::explain::document::explanation::{
-    Alternative, Detectable, EFFECTS_TIE, EffectFound, Evidence, Quantity, Verdict,
-};
 use crate::explain::document::sentences;
 use crate::explain::effects::{self, Action, Port};
+use crate::explain::explanation::{
+    Alternative, Detectable, EFFECTS_TIE, EffectFound, Evidence, Quantity, Verdict,
+};
 use crate::explain::linear::check::Trouble;
 use crate::explain::linear::fit::{Fit, Problem};
 use crate::explain::linear::model::functionals::{

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::explain::document::explanation::Curve;
 use crate::explain::effects;
+use crate::explain::explanation::Curve;
 use crate::explain::linear::fit::{Fit, Problem};
 use crate::explain::linear::model::functionals::Signal;
 use crate::explain::linear::screening::score_tests::Bench;

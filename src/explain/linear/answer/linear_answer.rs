@@ -3,16 +3,16 @@
 use super::learned_curve;
 use super::probability::probability;
 use super::regions;
-use crate::explain::document::explanation::{
-    AugmentedModel, EXPLANATION_FORMAT, EffectSize, Explanation, FitTable, Location, NoiseFound,
-    Remaining, SignalTraces, Verdict,
-};
 use crate::explain::document::plots::{extremes, spectrum, spectrum_picture};
 use crate::explain::document::sentences;
 use crate::explain::effects::Port;
+use crate::explain::explanation::{
+    AugmentedModel, EXPLANATION_FORMAT, EffectSize, Explanation, FitTable, Location, NoiseFound,
+    Remaining, SignalTraces, Verdict,
+};
 use crate::explain::linear::check::same_factor;
 use crate::explain::linear::data::{Data, Series};
-use crate::explain::linear::decision::free_run_decision::Finding;
+use crate::explain::linear::decision::output_error_decision::Finding;
 use crate::explain::linear::fit::{Fit, Problem};
 use crate::explain::linear::known_simulation::Known;
 use crate::explain::linear::screening::output_adequacy::adequacy;
@@ -245,9 +245,8 @@ impl Answer<'_> {
             None => counts.then(|| deviance(parameters) - deviance(model)),
         };
         let square = |f: f64| f * f;
-        let lost = |f: &crate::explain::document::explanation::FitFigure| {
-            square((100.0 - f.fit_percent) / 100.0)
-        };
+        let lost =
+            |f: &crate::explain::explanation::FitFigure| square((100.0 - f.fit_percent) / 100.0);
         let size = EffectSize {
             linear_share: (1.0 - lost(&train.parameters_only)).clamp(0.0, 1.0),
             removed_share: (1.0

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::linear_answer::Answer;
-use crate::explain::document::explanation::ParameterChange;
+use crate::explain::explanation::ParameterChange;
 use crate::explain::linear::fit::{Fit, Problem};
 use crate::explain::linear::model::linear_plant::Plant;
 use crate::explain::linear::model::structure::Structure;

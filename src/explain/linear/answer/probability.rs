@@ -33,8 +33,8 @@
 //! A probability is that of such a mixture: where nine recordings of ten miss something, fewer of the answers "consistent"
 //! are right.
 
-use crate::explain::document::explanation::{FitTable, Verdict};
-use crate::explain::linear::decision::free_run_decision::Finding;
+use crate::explain::explanation::{FitTable, Verdict};
+use crate::explain::linear::decision::output_error_decision::Finding;
 use crate::explain::linear::screening::output_adequacy::LEVEL;
 use crate::explain::linear::search::penalties::NEEDED;
 

@@ -2,8 +2,8 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
-use crate::explain::document::explanation::Regime;
 use crate::explain::effects;
+use crate::explain::explanation::Regime;
 use crate::explain::linear::data::{Data, Series};
 use crate::noise::{Mask, Noise};
 

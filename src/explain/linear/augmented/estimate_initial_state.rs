@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::simulate_augmented::AugmentedError;
-use crate::explain::document::explanation::{AugmentedModel, StatePrior};
+use crate::explain::explanation::{AugmentedModel, StatePrior};
 use crate::explain::linear::data::deviation;
 
 /// Samples that an initial state is estimated from, at most.

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use crate::explain::document::explanation::{AugmentedModel, ModelEffect, SignalReference};
 use crate::explain::effects::{self, Action};
+use crate::explain::explanation::{AugmentedModel, ModelEffect, SignalReference};
 use crate::explain::linear::data::{Segment, delayed};
 use crate::explain::linear::model::coordinates::Coordinates;
 use crate::explain::linear::model::functionals::{Functionals, Signal};

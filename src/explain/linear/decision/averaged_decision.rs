@@ -1,8 +1,8 @@
 //! When the averaged equation is the way, and what it decides.
 
-use super::free_run_decision::{Finding, Rival};
-use crate::explain::document::explanation::Verdict;
+use super::output_error_decision::{Finding, Rival};
 use crate::explain::effects::Definition;
+use crate::explain::explanation::Verdict;
 use crate::explain::linear::data::{Data, Segment, delayed};
 use crate::explain::linear::fit::{Fit, Problem};
 use crate::explain::linear::identification::autoregression::initial_states;
@@ -14,11 +14,11 @@ use crate::explain::linear::search::forward_selection::{look_alikes, required};
 use crate::explain::linear::search::null_models::Boring;
 use crate::explain::linear::search::penalties::NEEDED;
 use crate::explain::linear::weak_form::equation_of_motion::Equation;
-use crate::explain::linear::weak_form::force_adequacy::{adequacy, holds};
-use crate::explain::linear::weak_form::laws::Form;
-use crate::explain::linear::weak_form::proof::{
+use crate::explain::linear::weak_form::equation_proof::{
     Proof, as_fit, error_across_halves, halves, inside, tethered,
 };
+use crate::explain::linear::weak_form::force_adequacy::{adequacy, holds};
+use crate::explain::linear::weak_form::laws::Form;
 use crate::explain::linear::weak_form::rank::{Candidate, best_of, last_law, rank};
 use crate::explain::linear::weak_form::windows::{Reading, Windows};
 use crate::log::Log;
@@ -354,7 +354,7 @@ fn finding(
     let verdict = if !adequate {
         Verdict::Unexplained
     } else if let Some(rival) = runner_up.filter(|_| found && equation.laws.len() == 1) {
-        if gain - rival.gain < crate::explain::document::explanation::EFFECTS_TIE {
+        if gain - rival.gain < crate::explain::explanation::EFFECTS_TIE {
             Verdict::Family
         } else {
             Verdict::Named

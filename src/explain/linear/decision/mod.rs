@@ -2,8 +2,8 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `free_run_decision` | by output error: the search, its tests, the verdict |
+//! | `output_error_decision` | by output error: the search, its tests, the verdict |
 //! | `averaged_decision` | by the averaged equation of motion, for drives |
 
 pub(crate) mod averaged_decision;
-pub(crate) mod free_run_decision;
+pub(crate) mod output_error_decision;

@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::explain::document::explanation::{FitFigure, FitSteps};
+use crate::explain::explanation::{FitFigure, FitSteps};
 use crate::explain::linear::data::{Data, Series};
 use crate::explain::linear::fit::{Effort, Fit, Problem};
 use crate::noise::Mask;

@@ -1,8 +1,8 @@
 //! What a named effect needs beyond the null model, and what some effects owe beyond BIC.
 
 use super::single_effects::Ranked;
-use crate::explain::document::explanation::EFFECTS_TIE;
 use crate::explain::effects::Unit;
+use crate::explain::explanation::EFFECTS_TIE;
 use crate::explain::linear::fit::Fit;
 use crate::explain::linear::model::functionals::{Functionals, dot};
 

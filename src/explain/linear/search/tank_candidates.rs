@@ -8,8 +8,8 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::single_effects::Ranked;
-use crate::explain::document::explanation::StatePrior;
 use crate::explain::effects::{self, Definition};
+use crate::explain::explanation::StatePrior;
 use crate::explain::linear::cascade::{self, Cascade, CascadeFit, Number};
 use crate::explain::linear::data::Data;
 use crate::explain::linear::fit::{Effort, Fit, Problem};

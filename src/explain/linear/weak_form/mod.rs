@@ -19,15 +19,15 @@
 //! | `rank` | which law |
 //! | `force_adequacy` | the test of the residual force |
 //! | `tether` | the free run with the averaged equation as prior |
-//! | `proof` | the tethered fit, its errors across halves, what it adds to a decision |
+//! | `equation_proof` | the tethered fit, its errors across halves, what it adds to a decision |
 //!
 //! When this is the way, and what it decides, is said in [`averaged_decision`](super::decision::averaged_decision).
 
 pub(crate) mod correlated_regression;
 pub(crate) mod equation_of_motion;
+pub(crate) mod equation_proof;
 pub(crate) mod force_adequacy;
 pub(crate) mod laws;
-pub(crate) mod proof;
 pub(crate) mod rank;
 #[cfg(test)]
 mod tests;

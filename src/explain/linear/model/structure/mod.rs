@@ -92,7 +92,7 @@ pub(crate) struct Structure {
     pub(crate) initial: Vec<Vec<f64>>,
     /// The direct feedthrough is free (it then is of the plant's numbers, so the plant must be free too).
     pub(crate) feedthrough_free: bool,
-    /// Steps of the recursion in a sample interval, more than one where a law decides within it (see `finer`).
+    /// Steps of the recursion in a sample interval, more than one where a law decides within it (see `substeps`).
     pub(crate) substeps: usize,
     /// The new effects act in this recording only; else in all.
     pub(crate) recording: Option<usize>,

@@ -6,9 +6,9 @@ use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
 use super::equation_of_motion::Equation;
+use super::equation_proof::halves;
 use super::force_adequacy::adequacy;
 use super::laws::Form;
-use super::proof::halves;
 use super::windows::{Reading, Windows};
 use crate::explain::linear::data::{Data, Segment};
 use crate::explain::linear::model::structure::Structure;

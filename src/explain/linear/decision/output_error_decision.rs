@@ -1,7 +1,7 @@
 //! Decides: consistent, parameters, named, family or unexplained.
 
-use crate::explain::document::explanation::Verdict;
 use crate::explain::effects::{self, Definition};
+use crate::explain::explanation::Verdict;
 use crate::explain::linear::check::coarse_sensor;
 use crate::explain::linear::check::{Freeze, Trouble, frozen};
 use crate::explain::linear::data::{Data, difference};
@@ -22,7 +22,7 @@ use crate::explain::linear::search::single_effects::{Ranked, single_effects};
 use crate::noise::Mask;
 
 /// Names whose criteria differ by less explain the recording equally well (Kass and Raftery 1995: 6 is "strong").
-const TIE: f64 = crate::explain::document::explanation::EFFECTS_TIE;
+const TIE: f64 = crate::explain::explanation::EFFECTS_TIE;
 /// Evidence from which held-out blocks are not asked: they could not say otherwise.
 const BEYOND_DOUBT: f64 = 100.0;
 /// With a larger probability what is left is called noise, and no second effect is looked for.
@@ -67,7 +67,7 @@ pub(crate) struct Finding {
         f64,
     )>,
     /// What was decided by the averaged equation of motion.
-    pub(crate) weak: Option<Box<crate::explain::linear::weak_form::proof::Proof>>,
+    pub(crate) weak: Option<Box<crate::explain::linear::weak_form::equation_proof::Proof>>,
 }
 
 impl Finding {
