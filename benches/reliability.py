@@ -9,7 +9,7 @@ missing. Printed are what was stated and what was right, by stated probability a
 other by their names or by near relatives, a tie among which all effects are, `consistent` and `parameters` where nothing is
 missing, and `unexplained` where the effect is in no library.
 
-`--fit` prints the constants of src/explain/probability.rs as these cases give them. Where constants were fitted, the table of
+`--fit` prints the constants of src/explain/linear/answer/probability.rs as these cases give them. Where constants were fitted, the table of
 the same cases says nothing: draw others.
 """
 import argparse, concurrent.futures as futures, json, math, os, subprocess, sys, tempfile

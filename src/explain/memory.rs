@@ -1,6 +1,6 @@
 //! What a question takes of memory, before the library of effects is held against the recording.
 
-use super::error::ExplainError;
+use super::document::explain_error::ExplainError;
 use crate::limits::{self, of_numbers};
 use crate::log::Log;
 

@@ -9,79 +9,38 @@
 //! simulation ─┘  plant + known effects └── screen ── fit effects, singly, pairs ┘
 //! ```
 //!
-//! | file | what it holds |
+//! There are two engines: one for simulations that are linear models or columns of outputs, one for plants in equations.
+//!
+//! | folder or file | what it holds |
 //! |---|---|
-//! | `simulation`, `baseline`, `offset`, `rebaseline` | the simulation as a model, also from a column of its outputs |
-//! | `coordinates`, `plant`, `structure`, `functionals`, `run`, `finer` | the augmented model: numbers, effects, the recursion |
-//! | `effects` | the library, one file a family |
-//! | `noise`, `fit` | coloured, heavy-tailed noise; Levenberg and Marquardt |
-//! | `screen`, `templates`, `features` | one Gauss-Newton step for everything |
-//! | `cascade`, `tanks`, `rectified` | plants of another class, which no effect added to the linear one becomes |
-//! | `search`, `refine`, `plausible`, `second`, `inquiry` | the fits, what is kept of them, the decision |
-//! | `weak` | drives: the averaged equation of motion, where a free run cannot tell |
-//! | `question`, `memory` | which ways are gone and which of them speaks; what that takes of the memory |
-//! | `check` | the data before the physics: dropouts, outliers, wraps, clocks, signs, units, exchanged outputs, a stuck sensor |
-//! | `adequacy` | tests of what is left |
-//! | `locate`, `curve`, `prove`, `probability` | where, the law without a form, held-out blocks, how sure |
-//! | `engine`, `plant_answer` | simulations that are plants in equations: terms at places of the equations, and what is said |
-//! | `answer`, `account`, `words`, `explanation`, `augmented`, `start` | what is said, and the model that can be run |
+//! | `explain_recordings` | the question about a linear model or columns: which ways of answering it are taken |
+//! | `simulation`, `memory` | the simulation as the caller gives it; the memory that a question takes |
+//! | `effects` | the library of the linear engine, one file a family |
+//! | `linear` | the linear engine: from the checks of the data to the answer |
+//! | `engine` | the engine for plants in equations: terms at places of the equations |
+//! | `plant_answer` | the question about a plant in equations, and its answer |
+//! | `columns` | equations that reproduce columns of outputs, for the engine of plants in equations |
+//! | `compare_explanations` | the choice between the answers of both engines, for columns |
+//! | `explanation` | the explanation as a document (`innovant-explanation/1`): its types |
+//! | `document` | its sentences, plots, units and errors |
 
-mod account;
-mod adequacy;
-mod answer;
-mod augmented;
-mod baseline;
-mod cascade;
-mod changes;
-mod check;
 mod columns;
-mod coordinates;
-mod curve;
-mod data;
-mod doubt;
+mod compare_explanations;
+mod document;
 pub(crate) mod effects;
 mod engine;
-mod error;
+mod explain_recordings;
 mod explanation;
-mod features;
-mod finer;
-mod fit;
-#[cfg(test)]
-mod fixtures;
-mod functionals;
-mod inquiry;
-mod locate;
+mod linear;
 mod memory;
-mod offset;
-mod plant;
 mod plant_answer;
-mod plausible;
-mod probability;
-mod prove;
-mod question;
-mod rebaseline;
-mod rectified;
-mod refine;
-mod run;
-mod screen;
-mod search;
-mod second;
-mod simplest;
 mod simulation;
-mod start;
-mod structure;
-mod tanks;
-mod templates;
-mod uncertainty;
-mod units;
-mod weak;
-mod words;
 
-pub use augmented::AugmentedError;
+pub use document::explain_error::ExplainError;
 pub use engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
 pub use engine::scope::UnknownPlantEffect;
 pub use engine::terms::documentation::{Imitation, PLANT_EFFECTS, PlantEffect, plant_effect};
-pub use error::ExplainError;
+pub use explain_recordings::{Options, explain};
 pub use explanation::{
     Alternative, AugmentedModel, AugmentedPlant, Curve, Detectable, EXPLANATION_FORMAT,
     EffectFound, EffectSize, EquationMap, Evidence, Explanation, FitFigure, FitSteps, FitTable,
@@ -89,8 +48,8 @@ pub use explanation::{
     ModelEffect, NoiseFound, ParameterChange, Quantity, Regime, Remaining, SignalReference,
     SignalTraces, StatePrior, Verdict,
 };
+pub use linear::augmented::simulate_augmented::AugmentedError;
 pub use plant_answer::{
     AugmentedPlantError, Original, PlantOptions, PlantQuestionError, explain_plant,
 };
-pub use question::{Options, explain};
 pub use simulation::Simulation;

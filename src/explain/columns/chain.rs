@@ -7,8 +7,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::filtered_signals::{Part, Signal, Signals, written};
 use super::regression::OutputEquation;
-use super::signals::{Part, Signal, Signals, written};
 use crate::log::Channel;
 use crate::physics::{function_names, is_reserved};
 

@@ -7,21 +7,21 @@
 //! than a hundredth of what the recording differs from the simulation are dropped. What is known of a plant in equations then holds
 //! for columns too. What the equations miss of the simulated outputs is subtracted from the recorded ones.
 
-mod answer;
 mod chain;
-mod eliminate;
+mod columns_answer;
+mod drop_coefficients;
+mod filtered_signals;
 mod regression;
-mod signals;
 
-pub(crate) use answer::attempt;
+pub(crate) use columns_answer::attempt;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use self::chain::{Chains, Column};
-use self::eliminate::eliminate;
+use self::drop_coefficients::eliminate;
+use self::filtered_signals::{Regressors, Signals};
 use self::regression::{OutputEquation, output_equation};
-use self::signals::{Regressors, Signals};
 use crate::log::Channel;
 use crate::noise::{Noise, Series};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};

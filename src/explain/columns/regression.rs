@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::eliminate::eliminate;
-use super::signals::{Part, Regressors, Signal, Signals};
+use super::drop_coefficients::eliminate;
+use super::filtered_signals::{Part, Regressors, Signal, Signals};
 
 /// Most nonlinear functions of an equation.
 const MOST_FUNCTIONS: usize = 3;

@@ -1,6 +1,8 @@
 //! Forces that dissipate: dry friction with and without a breakaway force, drag.
 
-use super::lambert::exponential_w;
+mod lambert;
+
+use self::lambert::exponential_w;
 use super::{
     Action, Definition, Mimic, Motion, Needs, Observed, Parameter, Sense, Unit, decay, level,
 };

@@ -10,14 +10,13 @@ mod command;
 mod disturbance;
 mod flow;
 mod friction;
-mod lambert;
 mod law;
-mod linear;
 mod process;
 mod sensor;
 mod stiffness;
 #[cfg(test)]
 mod tests;
+mod wrong_parameters;
 
 pub(crate) use law::{CHARGE_ORDERS, Clock, Motion, Observed, charge, decay, level};
 
@@ -178,7 +177,7 @@ pub(crate) enum Action {
     MissingPath,
     /// A curve of the integral of an input, added to the outputs.
     Charge,
-    /// Part of a plant of another class, which is run in place of the linear one (`tanks`).
+    /// Part of a plant of another class, which is run in place of the linear one (`tank_simulation`).
     Process,
     /// Found by an exact test; in the model it is a sensor law without effect on fits.
     Exact,
@@ -303,9 +302,9 @@ pub fn library() -> impl Iterator<Item = &'static Definition> {
     .flatten()
 }
 
-/// The entry with this id and variant, also of what is not physics but a number (`linear`).
+/// The entry with this id and variant, also of what is not physics but a number (`wrong_parameters`).
 pub(crate) fn find(id: &str, variant: &str) -> Option<&'static Definition> {
     library()
-        .chain(linear::ENTRIES)
+        .chain(wrong_parameters::ENTRIES)
         .find(|d| d.id == id && d.variant == variant)
 }

@@ -2,16 +2,16 @@
 
 use rayon::prelude::*;
 
-use crate::explain::engine::fitting::eliminate::alone;
-use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
-use crate::explain::engine::fitting::second_effect::{determined, differs};
-use crate::explain::engine::holdout::{EXPLAINED, Estimator, HeldOut, held_out};
-use crate::explain::engine::hypothesis::Trial;
-use crate::explain::engine::scope::Scope;
-use crate::explain::engine::step::{Stage, Step, improved, step};
-use crate::explain::engine::terms::library::Needs;
-use crate::explain::engine::terms::names::named;
-use crate::explain::engine::thresholds::{BETTER_FITS, FINISHED, MOST, NEEDED, SECOND};
+use super::fitting::eliminate::alone;
+use super::fitting::fitted::{Fitted, TIE, with_more};
+use super::fitting::second_effect::{determined, differs};
+use super::holdout::{EXPLAINED, Estimator, HeldOut, held_out};
+use super::hypothesis::Trial;
+use super::scope::Scope;
+use super::step::{Stage, Step, improved, step};
+use super::terms::library::Needs;
+use super::terms::names::named;
+use super::thresholds::{BETTER_FITS, FINISHED, MOST, NEEDED, SECOND};
 use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{EstimateError, EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, Plant};

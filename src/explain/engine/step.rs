@@ -2,18 +2,18 @@
 
 use rayon::prelude::*;
 
-use crate::explain::engine::fitting::candidate::{Candidate, candidate};
-use crate::explain::engine::fitting::edit::Place;
-use crate::explain::engine::fitting::finish::finished;
-use crate::explain::engine::fitting::fitted::{Fitted, TIE, order, searched, with_more};
-use crate::explain::engine::fitting::formulas::formulas;
-use crate::explain::engine::fitting::refined_curve::refined_curve;
-use crate::explain::engine::fitting::second_effect::drop_alike;
-use crate::explain::engine::hypothesis::{Ground, trials};
-use crate::explain::engine::scope::Scope;
-use crate::explain::engine::screening::screen::{Lead, Screen, screen};
-use crate::explain::engine::terms::names::{SPECIFIC, named, rank_of};
-use crate::explain::engine::thresholds::{
+use super::fitting::candidate::{Candidate, candidate};
+use super::fitting::edit::Place;
+use super::fitting::finish::finished;
+use super::fitting::fitted::{Fitted, TIE, order, searched, with_more};
+use super::fitting::formulas::formulas;
+use super::fitting::refined_curve::refined_curve;
+use super::fitting::second_effect::drop_alike;
+use super::hypothesis::{Ground, trials};
+use super::scope::Scope;
+use super::screening::screen::{Lead, Screen, screen};
+use super::terms::names::{SPECIFIC, named, rank_of};
+use super::thresholds::{
     AT_A_PLACE, BETTER, COMPARED, FINISHED, FITTED, FOLLOWS, FORETOLD, GLANCE, GLANCED,
     GLANCED_ACCURACY, GLANCED_STEPS, IMITATED, LEFT, MOST, MOST_STEPS, NEEDED, OF_A_KIND, THOROUGH,
     chance,

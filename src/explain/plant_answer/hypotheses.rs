@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use super::{Answer, figure};
+use crate::explain::document::sentences::{number, quantity};
 use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
 use crate::explain::engine::hypothesis::{Hypothesis, Trial};
 use crate::explain::engine::thresholds::{NEEDED, SURE};
 use crate::explain::explanation::{
     FitFigure, HypothesisFit, HypothesisFound, HypothesisRival, HypothesisVerdict, Quantity,
 };
-use crate::explain::words::{number, quantity};
 use crate::noise::Series;
 use crate::physics::ModelSpec;
 use crate::physics::estimate::{EstimateOptions, Study};

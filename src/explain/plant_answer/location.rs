@@ -1,9 +1,10 @@
 //! Where recording and equations differ: at which outputs, when, at which frequencies and operating points.
 
 use super::{Answer, Verdict};
-use crate::explain::data::{Data, Segment, difference};
+use crate::explain::document::plots::spectrum;
 use crate::explain::explanation::Location;
-use crate::explain::locate::{excess, frequencies, regimes, spectrum, windows};
+use crate::explain::linear::answer::regions::{excess, frequencies, regimes, windows};
+use crate::explain::linear::data::{Data, Segment, difference};
 use crate::noise::Series;
 use crate::physics::estimate::Form;
 

@@ -1,17 +1,18 @@
 //! The answer where the simulation is a plant in equations.
 
-mod effects;
 mod hypotheses;
 mod location;
+mod plant_effects;
 mod question;
-mod simulate;
+mod simulate_explained;
 
 pub use question::{PlantOptions, PlantQuestionError};
-pub use simulate::{AugmentedPlantError, Original};
+pub use simulate_explained::{AugmentedPlantError, Original};
 
 use nalgebra::DMatrix;
 
-use super::answer::extremes;
+use super::document::plots::{extremes, spectrum, spectrum_picture};
+use super::document::sentences::{number, quantity};
 use super::engine::fitting::fitted::Fitted;
 use super::engine::holdout::{EXPLAINED, HeldOut, blocks};
 use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
@@ -24,8 +25,6 @@ use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
     FitTable, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
 };
-use super::locate::{spectrum, spectrum_picture};
-use super::words::{number, quantity};
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
 use crate::noise::Series;

@@ -1,7 +1,7 @@
 //! Where in the equations physics is missing: for every place and every variable the strongest score test.
 
+use super::screen::Lead;
 use crate::explain::engine::fitting::edit::Place;
-use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::explanation::EquationMap;
 use crate::physics::ModelSpec;

@@ -6,18 +6,18 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use super::curve::{Curve, curves};
+use super::map::map;
+use super::path::{Hooked, Path, hooked, path};
+use super::projection::{Projection, SIGNATURE};
+use crate::explain::document::plots::spectrum;
 use crate::explain::engine::fitting::edit::{Place, enters_several, is_of, sensors};
-use crate::explain::engine::screening::curve::{Curve, curves};
-use crate::explain::engine::screening::map::map;
-use crate::explain::engine::screening::path::{Hooked, Path, hooked, path};
-use crate::explain::engine::screening::projection::{Projection, SIGNATURE};
 use crate::explain::engine::terms::argument::{Argument, ArgumentForm, arguments};
 use crate::explain::engine::terms::library::{Needs, Port, Starts, TERMS, Term};
 use crate::explain::engine::terms::names::{heats_itself, is_without_units, rank_of};
 use crate::explain::engine::terms::values::{Instance, evaluate, grid};
 use crate::explain::engine::thresholds::significant;
 use crate::explain::explanation::EquationMap;
-use crate::explain::locate::spectrum;
 use crate::noise::Series;
 use crate::physics::estimate::{Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Node, Unknown, VariableId};

@@ -1,0 +1,78 @@
+//! The answer where a simulation is known by its outputs, and equations reproduce them.
+
+use super::{Question, USEFUL, reproduce};
+use crate::explain::engine::terms::documentation::plant_effect;
+use crate::explain::explanation::Explanation;
+use crate::explain::linear::check::Checked;
+use crate::explain::plant_answer::{PlantOptions, explain_plant};
+use crate::explain::simulation::Simulation;
+use crate::identify::Recording;
+use crate::log::Log;
+use crate::physics::estimate::PlantRecording;
+
+/// Explains with equations in place of the simulated columns; none where no equations reproduce them.
+pub(crate) fn attempt(checked: &Checked, without: &[String]) -> Option<Explanation> {
+    let Simulation::Outputs(simulated) = &checked.simulation else {
+        return None;
+    };
+    let first = checked.recordings.first()?;
+    let known = checked.recordings.iter().zip(simulated);
+    let columns: Vec<PlantRecording> = known
+        .map(|(recorded, simulated)| PlantRecording {
+            outputs: simulated.output_data.clone(),
+            ..PlantRecording::from(recorded)
+        })
+        .collect();
+    let difference: Vec<f64> = (0..first.outputs.len())
+        .map(|j| difference(&checked.recordings, simulated, j))
+        .collect();
+    let question = Question {
+        inputs: &first.inputs,
+        outputs: &first.outputs,
+        difference: &difference,
+    };
+    let found = reproduce(&columns, &question).filter(|f| f.misfit <= USEFUL)?;
+    let outputs = first.outputs.len();
+    let mut logs = checked.recordings.clone();
+    for (r, log) in logs.iter_mut().enumerate() {
+        for (j, y) in log.output_data.iter_mut().enumerate() {
+            let rest = &found.remainder[r * outputs + j];
+            y.iter_mut().zip(rest).for_each(|(y, rest)| *y -= rest);
+        }
+    }
+    let recordings = logs
+        .iter()
+        .map(|log| Recording::of_log(log, None))
+        .collect();
+    let options = PlantOptions {
+        hold: found.hold,
+        // Effects that only linear simulators have are not tried here.
+        without: without
+            .iter()
+            .filter(|id| plant_effect(id).is_some())
+            .cloned()
+            .collect(),
+        ..PlantOptions::default()
+    };
+    let mut explanation = explain_plant(&found.plant, &logs, recordings, &options).ok()?;
+    explanation.summary.push(format!(
+        "The simulated outputs follow equations with {} states, to {:.2} % of what the recording differs by; these were changed.",
+        found.plant.spec.states().len(),
+        100.0 * found.misfit
+    ));
+    if let Some(plant) = &mut explanation.plant {
+        plant.simulation = Some(found.plant.spec.text.clone());
+    }
+    Some(explanation)
+}
+
+/// Root mean square of recorded less simulated.
+fn difference(recorded: &[Log], simulated: &[Log], output: usize) -> f64 {
+    let pairs = recorded.iter().zip(simulated).flat_map(|(r, s)| {
+        let ours = r.output_data[output].iter();
+        ours.zip(&s.output_data[output])
+    });
+    let known = pairs.map(|(y, s)| y - s).filter(|e| e.is_finite());
+    let (sum, count) = known.fold((0.0, 0), |(sum, n), e| (sum + e * e, n + 1));
+    (sum / f64::from(count.max(1))).sqrt()
+}

@@ -1,0 +1,150 @@
+//! Equations that are found again, and what they are good for.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+use super::*;
+use crate::explain::linear::check::Checked;
+use crate::explain::simulation::Simulation;
+use crate::explain::{Explanation, Verdict};
+use crate::log::Log;
+use crate::physics::{Excitation, Point};
+
+const SAMPLES: usize = 1500;
+
+const PENDULUM: &str =
+    "model Pendulum parameter Real d = 0.4; parameter Real k = 9.0; parameter Real c = 0.0;
+  input Real u; output Real y; Real phi(start=0.2); Real w(start=0);
+equation
+  der(phi) = w; der(w) = 3*u - d*w - k*sin(phi) - c*w*abs(w); y = phi;
+end Pendulum;";
+
+/// A coil that drives a mass: the current and the position are seen.
+const COIL: &str =
+    "model Coil input Real u; output Real ic; output Real xl; Real i; Real x; Real v;
+equation
+  der(i) = 4*u - 3*i - 2*v; der(x) = v; der(v) = 5*i - 8*x - v; ic = i; xl = x;
+end Coil;";
+
+/// A level that is held for some samples, and jumps: the same numbers on every machine.
+fn steps(every: usize) -> Vec<f64> {
+    let mut state = 12_345_u64;
+    let mut level = 0.0;
+    (0..SAMPLES)
+        .map(|k| {
+            if k % every == 0 {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                level = (state >> 33) as f64 / f64::from(1_u32 << 30) - 1.0;
+            }
+            level
+        })
+        .collect()
+}
+
+fn channel(name: &str) -> Channel {
+    Channel {
+        name: name.to_owned(),
+        unit: None,
+    }
+}
+
+fn run(text: &str, change: impl Fn(&mut Point), u: &[f64], h: f64) -> Vec<Vec<f64>> {
+    let plant = Plant::new(parse(text).unwrap());
+    let mut point = plant.nominal();
+    change(&mut point);
+    let excitation = Excitation {
+        inputs: &[u],
+        length: u.len(),
+        sample_time: h,
+        start_time: 0.0,
+        hold: Hold::Zero,
+    };
+    plant.simulate(&point, &excitation, None).unwrap().outputs
+}
+
+fn found(text: &str, outputs: &[&str], u: &[f64], h: f64) -> Reproduced {
+    let columns = [PlantRecording {
+        outputs: run(text, |_| {}, u, h),
+        inputs: vec![u.to_vec()],
+        sample_time: h,
+        start_time: 0.0,
+    }];
+    let spread = |y: &Vec<f64>| {
+        let mean = y.iter().sum::<f64>() / y.len() as f64;
+        (y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / y.len() as f64).sqrt()
+    };
+    // A recording that differs by a twentieth of the outputs.
+    let difference: Vec<f64> = columns[0]
+        .outputs
+        .iter()
+        .map(|y| 0.05 * spread(y))
+        .collect();
+    let question = Question {
+        inputs: &[channel("u")],
+        outputs: &outputs.iter().map(|n| channel(n)).collect::<Vec<_>>(),
+        difference: &difference,
+    };
+    reproduce(&columns, &question).unwrap()
+}
+
+#[test]
+fn a_pendulum_is_found_with_its_sine_and_no_more() {
+    let found = found(PENDULUM, &["y"], &steps(20), 0.05);
+    assert!(found.misfit < REPRODUCED, "{}", found.misfit);
+    let text = &found.plant.spec.text;
+    assert_eq!(found.plant.spec.states().len(), 2, "{text}");
+    assert_eq!(found.plant.spec.parameters().len(), 3, "{text}");
+    assert!(text.contains("sin(y_state)"), "{text}");
+    // The sensor is outside of the dynamics.
+    assert!(text.contains("  y = y_state;"), "{text}");
+}
+
+#[test]
+fn of_equivalent_orders_those_with_the_fewest_terms_are_taken() {
+    let found = found(COIL, &["ic", "xl"], &steps(20), 0.05);
+    let text = &found.plant.spec.text;
+    // As in the original: three terms in the equation of the current, three in that of the speed.
+    assert_eq!(found.plant.spec.parameters().len(), 6, "{text}");
+    assert!(text.contains("ic = ic_state"), "{text}");
+}
+
+/// What is said of a pendulum that differs from its simulation by a parameter.
+fn answer(change: &dyn Fn(&mut Point)) -> Explanation {
+    let (u, h) = (steps(25), 0.05);
+    let log = |outputs: Vec<Vec<f64>>| Log {
+        name: "log".to_owned(),
+        sample_time: h,
+        start_time: 0.0,
+        inputs: vec![channel("u")],
+        outputs: vec![channel("y")],
+        input_data: vec![u.clone()],
+        output_data: outputs,
+        sha256: None,
+    };
+    let known = Simulation::Outputs(vec![log(run(PENDULUM, |_| {}, &u, h))]);
+    let mut recorded = run(PENDULUM, change, &u, h);
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    for y in &mut recorded[0] {
+        *y += 0.003 * random.sample::<f64, _>(StandardNormal);
+    }
+    attempt(&Checked::new(&[log(recorded)], &known, &|_| true), &[]).unwrap()
+}
+
+/// Of a pendulum with a drag that the simulation leaves out.
+pub(crate) fn drag() -> Explanation {
+    answer(&|p| p.parameters[2] = 0.3)
+}
+
+#[test]
+fn what_acts_in_the_recording_is_named_and_a_changed_parameter_is_not() {
+    let drag = drag();
+    assert_eq!(drag.verdict, Verdict::Named, "{:?}", drag.summary);
+    assert_eq!(drag.effects[0].effect, "quadratic_drag");
+    let plant = drag.plant.unwrap();
+    assert!(plant.simulation.unwrap().contains("sin(y_state)"));
+    let softer = answer(&|p| p.parameters[1] = 8.0);
+    assert_eq!(softer.verdict, Verdict::Parameters, "{:?}", softer.summary);
+}

@@ -1,0 +1,172 @@
+//! The question: which ways of answering it are gone, and which of them speaks.
+
+use super::columns;
+use super::compare_explanations::{agree, doubt, is_doubtful, stands_in};
+use super::document::explain_error::ExplainError;
+use super::effects::{self, Definition};
+use super::explanation::{Explanation, Verdict};
+use super::linear::answer::linear_answer::Answer;
+use super::linear::check::Checked;
+use super::linear::data::Data;
+use super::linear::decision::averaged_decision::attempt;
+use super::linear::decision::output_error_decision::{Finding, inquire};
+use super::linear::known_simulation::know;
+use super::linear::screening::output_adequacy::LEVEL;
+use super::memory;
+use super::simulation::Simulation;
+use crate::log::Log;
+use crate::noise::Mask;
+
+/// What can be asked for.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Effects that are taken out of the library: what would be said if nobody had thought of them?
+    pub without: Vec<String>,
+    /// Seed of the bootstrap.
+    pub seed: u64,
+}
+
+/// A free-run fit of a drive must run through the half of the recording that it was not fitted to with an error this many
+/// times that of the averaged equation to stand in its place: it follows its own half better always, and knows no mass.
+const MUCH_BETTER: f64 = 0.5;
+
+/// What the averaged equation of a drive leaves is mostly noise below this share of structure.
+const MOSTLY_NOISE: f64 = 0.5;
+
+/// Compares `recordings` with `simulation` and says what the simulation leaves out.
+///
+/// # Errors
+/// [`ExplainError`]: recordings and simulation do not fit together, are too short, or the simulation is unstable.
+pub fn explain(
+    recordings: &[Log],
+    simulation: &Simulation,
+    options: &Options,
+) -> Result<Explanation, ExplainError> {
+    for id in &options.without {
+        if effects::library().all(|d| d.id != id) {
+            return Err(ExplainError::UnknownEffect { id: id.clone() });
+        }
+    }
+    memory::check(recordings)?;
+    let allowed_id = |id: &str| !options.without.iter().any(|without| without == id);
+    // A law of one unit is not tried on what no output is measured in.
+    let outputs = &recordings.first().ok_or(ExplainError::NoRecording)?.outputs;
+    let measured = |unit: &str| {
+        outputs
+            .iter()
+            .any(|o| super::document::channel_units::is_in(o, unit))
+    };
+    let allowed = |d: &Definition| allowed_id(d.id) && d.unit_of_output().is_none_or(measured);
+    // The data before the physics: from here on they are as repaired.
+    let checked = Checked::new(recordings, simulation, &allowed_id);
+    let recordings = checked.recordings.as_slice();
+    let known = know(&checked)?;
+    let relative = known.relative;
+    let drive = attempt(recordings, &known, &allowed);
+    // What a law in the averaged equation of a drive explains to noise needs no other way, and the rest little. Where no law
+    // was found, the equation may be blind to what there is (effects of the sensor, another mode), and where a spring
+    // brings the mass back or a speed is measured, a free run tells as well.
+    let settled = drive.as_ref().is_some_and(|(_, finding, _)| {
+        finding.augmented.is_some()
+            && finding.weak.as_ref().is_some_and(|proof| proof.drifts())
+            && finding
+                .adequacy
+                .is_none_or(|a| a.p_value > LEVEL || a.share < MOSTLY_NOISE)
+    });
+    let ordinary = (!settled)
+        .then(|| inquire(&known, checked.mask(&known.data), &allowed))
+        .flatten();
+    let (known, mut finding, mask) = match (drive, ordinary) {
+        (Some((drive, averaged, counted)), Some((finding, mask)))
+            if tells_more(
+                (&finding, &known.data, &mask),
+                (&averaged, &drive.data, &counted),
+            ) =>
+        {
+            (known, finding, mask)
+        }
+        (Some(drive), _) => drive,
+        (None, Some((finding, mask))) => (known, finding, mask),
+        (None, None) => {
+            return Err(ExplainError::NoFit {
+                name: recordings[0].name.clone(),
+            });
+        }
+    };
+    finding.add(checked.troubles.clone());
+    let mut explanation = Answer {
+        recordings,
+        known: &known,
+        finding: &finding,
+        mask,
+        seed: options.seed,
+    }
+    .say();
+    // What no linear model reproduces is first explained relative to the simulated columns, which are exact. Only where that
+    // answer is doubtful are equations looked for that reproduce the columns, whose parameters can then be fitted too; data
+    // that were repaired are left to the search that knows how. The answer whose run follows the recording closer is given.
+    if !relative || !is_doubtful(&explanation) {
+        return Ok(explanation);
+    }
+    let equations = checked
+        .troubles
+        .is_empty()
+        .then(|| columns::attempt(&checked, &options.without))
+        .flatten();
+    Ok(match equations {
+        Some(equations) if stands_in(&equations, &explanation) => equations,
+        Some(equations) if agree(&equations, &explanation) => explanation,
+        _ => {
+            doubt(&mut explanation);
+            explanation
+        }
+    })
+}
+
+/// Whether the finding is an averaged equation of what is no drive, but a mass on a spring.
+fn is_brought_back(finding: &Finding) -> bool {
+    finding
+        .weak
+        .as_ref()
+        .is_some_and(|proof| proof.is_brought_back)
+}
+
+/// Whether a free-run fit tells more of a drive than its averaged equation, which leaves structure.
+fn tells_more(
+    (free_run, fitted, mask): (&Finding, &Data, &Mask),
+    (equation, whole, counted): (&Finding, &Data, &Mask),
+) -> bool {
+    // Where a free run drifts, a trend stands for whatever it misses.
+    let trend = free_run.model.structure.new_effects().iter().any(|e| {
+        matches!(
+            e.definition.id,
+            "sensor_drift" | "sensor_offset" | "load_step" | "periodic_disturbance"
+        )
+    });
+    let drifts = equation.weak.as_ref().is_some_and(|proof| proof.drifts());
+    if trend && drifts {
+        return false;
+    }
+    match equation.verdict {
+        Verdict::Named => {}
+        // Where neither has a name, the free run tells what the recording would have shown; but the structure that a drifting
+        // one leaves may be its drift, and the equation knows the mass.
+        Verdict::Parameters | Verdict::Consistent => {
+            return !drifts || matches!(free_run.verdict, Verdict::Named | Verdict::Family);
+        }
+        Verdict::Family | Verdict::Unexplained => return true,
+    }
+    if free_run.verdict == Verdict::Unexplained {
+        return false;
+    }
+    match (
+        free_run.error_across_halves(fitted, mask),
+        equation.error_across_halves(whole, counted),
+    ) {
+        (Some(free), Some(averaged)) if is_brought_back(equation) => free < averaged,
+        (Some(free), Some(averaged)) => free < MUCH_BETTER * averaged,
+        // What a half does not determine has nothing to say of the other.
+        (free, None) => free.is_some(),
+        (None, Some(_)) => false,
+    }
+}
