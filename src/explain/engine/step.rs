@@ -349,11 +349,12 @@ pub(super) fn step(stage: &Stage) -> Step {
     let best = fitted.iter().map(|f| f.gain).fold(0.0, f64::max);
     let close = |f: &Fitted| f.lead.curve.is_some() && f.gain > (1.0 - TIE.1) * best;
     if let (Some(at), Some((screen, _))) = (fitted.iter().position(close), tried.first()) {
+        let mut better = formulas(&fitted[at], &screen.arguments, &ground);
         if let Some(finer) = refined_curve(&fitted[at], &screen.arguments, &ground) {
+            better.extend(formulas(&finer, &screen.arguments, &ground));
             fitted[at] = finer;
         }
         let curve = &fitted[at];
-        let mut better = formulas(curve, &screen.arguments, &ground);
         better.retain(|f| f.gain > curve.gain + TIE.0);
         fitted.extend(better);
     }

@@ -167,14 +167,21 @@ impl Answer<'_> {
                     .collect::<Vec<f64>>(),
             );
         }
+        // Where nothing is known, the law may be as large as anywhere.
+        let unknown = value.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
         let std = (0..at.len()).map(|k| {
             let mut variance = 0.0;
             for (i, &p) in at_point.iter().enumerate() {
                 for (j, &q) in at_point.iter().enumerate() {
-                    variance += slopes[i][k] * covariance[(p, q)] * slopes[j][k];
+                    // A knot that no sample is near has an infinite variance, which is of no matter elsewhere.
+                    let slopes = slopes[i][k] * slopes[j][k];
+                    if slopes != 0.0 {
+                        variance += slopes * covariance[(p, q)];
+                    }
                 }
             }
-            variance.max(0.0).sqrt()
+            let std = variance.max(0.0).sqrt();
+            if std.is_finite() { std } else { unknown }
         });
         Some(Law {
             variable,

@@ -78,7 +78,21 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
     let instances: Vec<Instance> = FORMULAS
         .iter()
         .flat_map(|term| {
-            let all = grid(term, Some(argument), ground.recordings, &[]);
+            let mut all = grid(term, Some(argument), ground.recordings, &[]);
+            // What rises and falls, or steps, may do so at any knot: between quantiles it would be missed.
+            if let Some(middle) = term.shapes.iter().position(|s| s.symbol == "o") {
+                let first = all.first().map(|shapes| shapes[middle]);
+                let widths = all.iter().filter(|s| Some(s[middle]) == first);
+                let widths: Vec<Vec<f64>> = widths.cloned().collect();
+                for (shapes, knot) in widths
+                    .iter()
+                    .flat_map(|w| curve.knots.iter().map(move |k| (w, k)))
+                {
+                    let mut moved = shapes.clone();
+                    moved[middle] = *knot;
+                    all.push(moved);
+                }
+            }
             all.into_iter().map(move |shapes| Instance {
                 term,
                 argument: Some(at),
