@@ -570,7 +570,7 @@ fn estimates(effect: &EffectFound) -> Option<String> {
 
 /// How often answers like this one were right, by what tells most: how many effects are named, and whether score tests find
 /// structure beside them. Counted on 60 recordings of 23 classes of plants (`benches/physics_cases.py --seed 5` and `--seed 6`, the
-/// first of each; the check on others stands in `docs/accuracy.md`), with one right and one wrong answer added to each group.
+/// first 30 of each; the check on others stands in `docs/accuracy.md`), with one right and one wrong answer added to each group.
 /// Without a name it is the probability that something is missing, or that nothing is.
 fn probability(verdict: Verdict, effects: usize, p_value: f64) -> f64 {
     let (right, all) = match verdict {
