@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Answer, figure};
+use super::{Answer, figure, within_bounds};
 use crate::explain::document::sentences::{number, quantity};
 use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
 use crate::explain::engine::hypothesis::{Hypothesis, Trial};
@@ -83,7 +83,9 @@ impl Answer<'_> {
             names.len(),
         );
         let study = Study::new(&own.candidate.plant, self.recordings, &options).ok();
-        let covariance = study.as_ref().map(|s| s.covariance(&own.fit));
+        let covariance = study
+            .as_ref()
+            .map(|s| within_bounds(&self.plant.spec, s.covariance(&own.fit)));
         let at_bounds: Vec<String> = hypothesis
             .at_bounds(values)
             .iter()
@@ -93,7 +95,8 @@ impl Answer<'_> {
             let std = covariance
                 .as_ref()
                 .map(|c| c[(first + i, first + i)].max(0.0).sqrt());
-            let unit = hypothesis.numbers()[i].unit.clone().unwrap_or_default();
+            let stated = hypothesis.numbers()[i].unit.clone();
+            let unit = stated.unwrap_or_else(|| self.unit(name));
             // At a bound the curvature says nothing about how certain the number is.
             let inside = !at_bounds.contains(&hypothesis.numbers()[i].name);
             let std = std.filter(|s| inside && s.is_finite() && *s > 0.0);

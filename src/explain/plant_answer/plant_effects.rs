@@ -126,7 +126,7 @@ impl Answer<'_> {
     }
 
     /// The unit of a parameter in words; empty for a pure number.
-    fn unit(&self, parameter: &str) -> String {
+    pub(super) fn unit(&self, parameter: &str) -> String {
         let variable = self.found.plant.spec.find(parameter);
         let unit = variable.and_then(|v| self.units[v.index()].clone());
         unit.filter(|u| u != "1").unwrap_or_default()
