@@ -5,14 +5,19 @@ mod location;
 mod plant_effects;
 mod question;
 mod simulate_explained;
+mod stated_probability;
+mod summary;
+mod within_bounds;
 
 pub use question::{PlantOptions, PlantQuestionError};
 pub use simulate_explained::{AugmentedPlantError, Original};
 
 use nalgebra::DMatrix;
 
+use self::stated_probability::probability;
+use self::within_bounds::within_bounds;
+
 use super::document::plots::{extremes, spectrum, spectrum_picture};
-use super::document::sentences::{number, quantity};
 use super::engine::fitting::fitted::Fitted;
 use super::engine::holdout::{EXPLAINED, HeldOut, blocks};
 use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
@@ -23,7 +28,7 @@ use super::engine::terms::library::Port;
 use super::engine::thresholds::{LEFT, SURE, chance};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
-    FitTable, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
+    FitTable, NoiseFound, ParameterChange, Remaining, SignalTraces, Verdict,
 };
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
@@ -33,8 +38,6 @@ use crate::physics::{Excitation, Hold, ModelSpec, Plant, Span, units_in_words};
 
 /// A parameter is said to differ from the text where it does by so many standard deviations.
 const DIFFERENT: f64 = 3.3;
-/// Parameters of an effect that the summary lists.
-const MOST_ESTIMATES: usize = 6;
 /// Points of a picture.
 const TRACE_POINTS: usize = 1500;
 
@@ -95,21 +98,6 @@ struct Answer<'a> {
     covariance: DMatrix<f64>,
     /// The same with what the bounds of the text say of its parameters.
     within_bounds: DMatrix<f64>,
-}
-
-/// A covariance of numbers that begin with the parameters of a text, given that these are within their bounds: an observation of
-/// each with the variance of a uniform distribution (the update of a Kalman filter, one parameter after the other). Parameters
-/// that the recording determines only together have values of their own then.
-fn within_bounds(spec: &ModelSpec, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
-    for (i, v) in spec.parameters().into_iter().enumerate() {
-        let variable = spec.variable(v);
-        let variance = (variable.max - variable.min).powi(2) / 12.0;
-        let column = covariance.column(i).into_owned();
-        if variance.is_finite() && column[i].is_finite() && column[i] > 0.0 {
-            covariance -= &column * column.transpose() / (column[i] + variance);
-        }
-    }
-    covariance
 }
 
 /// Hypotheses are told apart by their names.
@@ -485,130 +473,5 @@ impl Answer<'_> {
             }
         }
         traces
-    }
-
-    fn summary(
-        &self,
-        verdict: Verdict,
-        effects: &[EffectFound],
-        parameters: &[ParameterChange],
-        output: &str,
-        (train, held_out): (&FitSteps, Option<&FitSteps>),
-        p_value: f64,
-    ) -> Vec<String> {
-        let mut lines = Vec::new();
-        match verdict {
-            Verdict::Consistent => lines.push(
-                "The equations explain the recording with the values of the text; what is left is noise.".to_owned(),
-            ),
-            Verdict::Parameters => lines.push(
-                "The equations explain the recording with other parameters; nothing is missing in them.".to_owned(),
-            ),
-            Verdict::Named | Verdict::Family => {
-                for effect in effects {
-                    lines.push(format!("{}.", effect.sentence));
-                    lines.extend(estimates(effect));
-                }
-            }
-            Verdict::Unexplained => lines.push(
-                "Something is missing in the equations, and no term of the library describes it surely.".to_owned(),
-            ),
-        }
-        if !effects.is_empty() && p_value < CHANCE {
-            lines.push(
-                "Score tests still find structure in the residuals: more is missing than this."
-                    .to_owned(),
-            );
-        }
-        if !parameters.is_empty() {
-            let each: Vec<String> = parameters
-                .iter()
-                .map(|p| {
-                    let recorded = Quantity {
-                        value: p.recording,
-                        std: p.std,
-                        unit: p.unit.clone(),
-                    };
-                    let (name, text) = (&p.name, number(p.simulation));
-                    format!("{name} {text} -> {}", quantity(&recorded))
-                })
-                .collect();
-            lines.push(format!(
-                "Parameters that differ from the text: {}.",
-                each.join("; ")
-            ));
-        }
-        if let (Some(held_out), false) = (held_out, effects.is_empty()) {
-            lines.push(format!(
-                "Fitted without a third of the recording, and run freely over it: {:.1} % without it, {:.1} % with it.",
-                held_out.parameters_only.fit_percent, held_out.augmented.fit_percent
-            ));
-        }
-        lines.push(format!(
-            "Free run of {output}: {:.1} % with the values of the text, {:.1} % with estimated parameters and initial states{}.",
-            train.simulation.fit_percent,
-            train.parameters_only.fit_percent,
-            if effects.is_empty() {
-                String::new()
-            } else {
-                format!(", {:.1} % with what was found", train.augmented.fit_percent)
-            }
-        ));
-        lines
-    }
-}
-
-/// The parameters of an effect with their standard deviations; none for a curve, which has too many.
-fn estimates(effect: &EffectFound) -> Option<String> {
-    let few = (1..=MOST_ESTIMATES).contains(&effect.parameters.len());
-    let each = effect.parameters.iter();
-    let each: Vec<String> = each
-        .map(|(name, q)| format!("{name} = {}", quantity(q)))
-        .collect();
-    few.then(|| format!("Estimated: {}.", each.join("; ")))
-}
-
-/// How often answers like this one were right, by what tells most: how many effects are named, and whether score tests find
-/// structure beside them. Counted on 60 recordings of 23 classes of plants (`benches/physics_cases.py --seed 5` and `--seed 6`, the
-/// first 30 of each; the check on others stands in `docs/accuracy.md`), with one right and one wrong answer added to each group.
-/// Without a name it is the probability that something is missing, or that nothing is.
-fn probability(verdict: Verdict, effects: usize, p_value: f64) -> f64 {
-    let (right, all) = match verdict {
-        Verdict::Named | Verdict::Family if effects > 1 => (2, 6),
-        Verdict::Named | Verdict::Family if p_value < CHANCE => (5, 8),
-        Verdict::Named | Verdict::Family => (27, 31),
-        Verdict::Unexplained => (4, 4),
-        Verdict::Consistent | Verdict::Parameters => (10, 11),
-    };
-    f64::from(right + 1) / f64::from(all + 2)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::physics::parse;
-
-    #[test]
-    fn bounds_are_observations_of_the_parameters() {
-        let text = "model Cart
-               parameter Real m(min=1, max=3) = 2; parameter Real d(min=0) = 1;
-               input Real u; output Real y; Real v;
-             equation m*der(v) = u - d*v; y = v; end Cart;";
-        let spec = parse(text).unwrap();
-        // Mass, damper and a number of an effect that is found by its ratio to the mass only.
-        let covariance =
-            DMatrix::from_row_slice(3, 3, &[9.0, 0.1, 4.4, 0.1, 0.5, 0.2, 4.4, 0.2, 2.2]);
-        let found = within_bounds(&spec, covariance.clone());
-        let mut information = covariance.clone().try_inverse().unwrap();
-        information[(0, 0)] += 12.0 / 4.0;
-        let expected = information.try_inverse().unwrap();
-        assert!((&found - &expected).norm() < 1e-9, "{found} {expected}");
-        assert!(found[(2, 2)] < 0.2 * covariance[(2, 2)]);
-        // What is not determined at all stays so.
-        let mut none = covariance;
-        none.row_mut(2).fill(0.0);
-        none.column_mut(2).fill(0.0);
-        none[(2, 2)] = f64::INFINITY;
-        assert_eq!(within_bounds(&spec, none)[(2, 2)], f64::INFINITY);
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::Answer;
 use crate::explain::engine::fitting::edit::{Place, user_of};
 use crate::explain::engine::fitting::fitted::Fitted;
-use crate::explain::engine::screening::curve::piece;
+use crate::explain::engine::screening::curve::Curve;
 use crate::explain::engine::terms::library::Port;
 use crate::explain::engine::terms::values::filled;
 use crate::explain::engine::thresholds::NEEDED;
@@ -194,11 +194,11 @@ impl Answer<'_> {
     /// What a term adds where its argument has these values, with these values of its numbers.
     fn curve_of(&self, fitted: &Fitted, values: &[f64], at: &[f64]) -> Option<Vec<f64>> {
         if let Some(curve) = &fitted.lead.curve {
-            let pieces = |z: f64| -> f64 {
-                let each = values.iter().enumerate();
-                each.map(|(i, v)| v * piece(&curve.knots, i, z)).sum()
+            let curve = Curve {
+                knots: curve.knots.clone(),
+                values: values.to_vec(),
             };
-            return Some(at.iter().map(|&z| pieces(z)).collect());
+            return Some(at.iter().map(|&z| curve.at(z)).collect());
         }
         let term = fitted.lead.term;
         let text = match fitted.hypothesis.and_then(|i| self.hypotheses.get(i)) {

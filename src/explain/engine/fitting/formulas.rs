@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::explain::engine::fitting::candidate::candidate;
 use crate::explain::engine::fitting::fitted::{Fitted, searched, with_more};
 use crate::explain::engine::hypothesis::Ground;
-use crate::explain::engine::screening::curve::piece;
+use crate::explain::engine::screening::curve::Curve;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::{Needs, Port, Starts, Term, curve, shape};
@@ -74,7 +74,10 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
     let at = best.lead.argument?;
     let argument = &arguments[at];
     let first = ground.study.parameters();
-    let values = &best.fit.point[first..first + curve.knots.len()];
+    let curve = Curve {
+        knots: curve.knots.clone(),
+        values: best.fit.point[first..first + curve.knots.len()].to_vec(),
+    };
     let instances: Vec<Instance> = FORMULAS
         .iter()
         .flat_map(|term| {
@@ -102,13 +105,7 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
         .collect();
     let columns = evaluate(&instances, arguments, ground.recordings)?;
     let z: Vec<f64> = argument.values.concat();
-    let wanted = DVector::from_iterator(
-        z.len(),
-        z.iter().map(|&z| {
-            let each = values.iter().enumerate();
-            each.map(|(i, v)| v * piece(&curve.knots, i, z)).sum()
-        }),
-    );
+    let wanted = DVector::from_iterator(z.len(), z.iter().map(|&z| curve.at(z)));
     let mut found: Vec<Near> = Vec::new();
     for (instance, column) in instances.into_iter().zip(columns) {
         let column = column.concat();

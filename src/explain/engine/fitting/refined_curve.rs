@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::explain::engine::fitting::candidate::{Candidate, candidate};
 use crate::explain::engine::fitting::fitted::{Fitted, TIE, searched, with_more};
 use crate::explain::engine::hypothesis::Ground;
-use crate::explain::engine::screening::curve::{Curve, piece};
+use crate::explain::engine::screening::curve::Curve;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH};
@@ -19,11 +19,6 @@ const MOST_KNOTS: usize = 30;
 const LEAST_SAMPLES: usize = 10;
 
 impl Curve {
-    fn at(&self, z: f64) -> f64 {
-        let each = self.values.iter().enumerate();
-        each.map(|(i, v)| v * piece(&self.knots, i, z)).sum()
-    }
-
     /// The same function with these knots more.
     fn with_knots(&self, new: &[f64]) -> Self {
         let mut knots = [&self.knots, new].concat();

@@ -65,6 +65,12 @@ fn piece_text(knots: &[f64], i: usize, z: &str) -> String {
 }
 
 impl Curve {
+    /// Its value where the argument is `z`.
+    pub(crate) fn at(&self, z: f64) -> f64 {
+        let each = self.values.iter().enumerate();
+        each.map(|(i, v)| v * piece(&self.knots, i, z)).sum()
+    }
+
     /// The curve as text, with names for its values.
     pub(crate) fn text(&self, z: &str, names: &[String]) -> String {
         let pieces = names.iter().enumerate();

@@ -1,0 +1,91 @@
+//! The answer in sentences.
+
+use super::Answer;
+use crate::explain::document::sentences::{number, quantity};
+use crate::explain::engine::select::CHANCE;
+use crate::explain::explanation::{EffectFound, FitSteps, ParameterChange, Quantity, Verdict};
+
+/// Parameters of an effect that the summary lists.
+const MOST_ESTIMATES: usize = 6;
+
+impl Answer<'_> {
+    pub(super) fn summary(
+        &self,
+        verdict: Verdict,
+        effects: &[EffectFound],
+        parameters: &[ParameterChange],
+        output: &str,
+        (train, held_out): (&FitSteps, Option<&FitSteps>),
+        p_value: f64,
+    ) -> Vec<String> {
+        let mut lines = Vec::new();
+        match verdict {
+            Verdict::Consistent => lines.push(
+                "The equations explain the recording with the values of the text; what is left is noise.".to_owned(),
+            ),
+            Verdict::Parameters => lines.push(
+                "The equations explain the recording with other parameters; nothing is missing in them.".to_owned(),
+            ),
+            Verdict::Named | Verdict::Family => {
+                for effect in effects {
+                    lines.push(format!("{}.", effect.sentence));
+                    lines.extend(estimates(effect));
+                }
+            }
+            Verdict::Unexplained => lines.push(
+                "Something is missing in the equations, and no term of the library describes it surely.".to_owned(),
+            ),
+        }
+        if !effects.is_empty() && p_value < CHANCE {
+            lines.push(
+                "Score tests still find structure in the residuals: more is missing than this."
+                    .to_owned(),
+            );
+        }
+        if !parameters.is_empty() {
+            let each: Vec<String> = parameters
+                .iter()
+                .map(|p| {
+                    let recorded = Quantity {
+                        value: p.recording,
+                        std: p.std,
+                        unit: p.unit.clone(),
+                    };
+                    let (name, text) = (&p.name, number(p.simulation));
+                    format!("{name} {text} -> {}", quantity(&recorded))
+                })
+                .collect();
+            lines.push(format!(
+                "Parameters that differ from the text: {}.",
+                each.join("; ")
+            ));
+        }
+        if let (Some(held_out), false) = (held_out, effects.is_empty()) {
+            lines.push(format!(
+                "Fitted without a third of the recording, and run freely over it: {:.1} % without it, {:.1} % with it.",
+                held_out.parameters_only.fit_percent, held_out.augmented.fit_percent
+            ));
+        }
+        lines.push(format!(
+            "Free run of {output}: {:.1} % with the values of the text, {:.1} % with estimated parameters and initial states{}.",
+            train.simulation.fit_percent,
+            train.parameters_only.fit_percent,
+            if effects.is_empty() {
+                String::new()
+            } else {
+                format!(", {:.1} % with what was found", train.augmented.fit_percent)
+            }
+        ));
+        lines
+    }
+}
+
+/// The parameters of an effect with their standard deviations; none for a curve, which has too many.
+fn estimates(effect: &EffectFound) -> Option<String> {
+    let few = (1..=MOST_ESTIMATES).contains(&effect.parameters.len());
+    let each = effect.parameters.iter();
+    let each: Vec<String> = each
+        .map(|(name, q)| format!("{name} = {}", quantity(q)))
+        .collect();
+    few.then(|| format!("Estimated: {}.", each.join("; ")))
+}
