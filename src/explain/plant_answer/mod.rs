@@ -3,10 +3,10 @@
 mod hypotheses;
 mod location;
 mod plant_effects;
+mod plant_summary;
 mod question;
 mod simulate_explained;
 mod stated_probability;
-mod summary;
 mod within_bounds;
 
 pub use question::{PlantOptions, PlantQuestionError};
