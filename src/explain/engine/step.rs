@@ -8,6 +8,7 @@ use super::fitting::finish::finished;
 use super::fitting::fitted::{Fitted, TIE, order, searched, with_more};
 use super::fitting::formulas::formulas;
 use super::fitting::refined_curve::refined_curve;
+use super::fitting::richer_form::richer_form;
 use super::fitting::second_effect::drop_alike;
 use super::hypothesis::{Ground, trials};
 use super::scope::Scope;
@@ -357,6 +358,14 @@ pub(super) fn step(stage: &Stage) -> Step {
         let curve = &fitted[at];
         better.retain(|f| f.gain > curve.gain + TIE.0);
         fitted.extend(better);
+    }
+    if let Some((screen, _)) = tried.first() {
+        let close = |f: &&mut Fitted| f.gain > (1.0 - TIE.1) * best && f.hypothesis.is_none();
+        for one in fitted.iter_mut().filter(close) {
+            if let Some(richer) = richer_form(one, &screen.arguments, &ground) {
+                *one = richer;
+            }
+        }
     }
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     order(&plant.spec, &mut fitted);

@@ -109,6 +109,11 @@ pub(crate) fn candidate(
         },
     );
     let body = filled(term.form, term, &text, &memories, &shapes, h).replace("{a}", &factor);
+    let rate = argument.and_then(|a| a.rate.as_deref());
+    let body = match body.contains("{dz}") {
+        true => body.replace("{dz}", rate?),
+        false => body,
+    };
     for (memory, name) in term.memories.iter().zip(&memories) {
         let first = memory.start.at(argument.map_or(0.0, |a| a.values[0][0]));
         let source = if lead.sensor {

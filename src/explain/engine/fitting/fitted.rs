@@ -95,7 +95,8 @@ pub(in crate::explain::engine) fn searched(lead: &Lead, recordings: &[PlantRecor
             | Starts::Samples(_)
             | Starts::Travel(_)
             | Starts::Moved(_)
-            | Starts::Rate(_) => 2.0,
+            | Starts::Rate(_)
+            | Starts::RateSize(_) => 2.0,
             Starts::Values(_) | Starts::Share(_) => 0.0,
         })
         .sum()

@@ -64,7 +64,10 @@ pub(in crate::explain::engine) fn formulas(
     let nearest = nearest(best, arguments, ground).unwrap_or_default();
     nearest
         .par_iter()
-        .filter_map(|near| in_its_place(best, near, arguments, ground))
+        .filter_map(|near| {
+            let start = (&near.shapes[..], near.strength);
+            in_its_place(best, near.term, start, arguments, ground)
+        })
         .collect()
 }
 
@@ -135,19 +138,18 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
     Some(found)
 }
 
-fn in_its_place(
+/// Another term at the place of a fit, from these values of its shapes and its strength.
+pub(super) fn in_its_place(
     best: &Fitted,
-    near: &Near,
+    term: &'static Term,
+    (shapes, strength): (&[f64], f64),
     arguments: &[Argument],
     ground: &Ground,
 ) -> Option<Fitted> {
     let (study, plant) = (ground.study, ground.plant);
-    let mut lead = Lead::untested(near.term, best.lead.place).at(
-        best.lead.place,
-        best.lead.argument,
-        &near.shapes,
-    );
-    lead.strength = near.strength;
+    let mut lead =
+        Lead::untested(term, best.lead.place).at(best.lead.place, best.lead.argument, shapes);
+    lead.strength = strength;
     let made = candidate(&plant.spec, &lead, arguments, ground.recordings)?;
     let options = with_more(ground.options, made.values.len());
     let limited = made.plant.clone().with_most_steps(MOST_STEPS);

@@ -7,4 +7,5 @@ pub(crate) mod finish;
 pub(crate) mod fitted;
 pub(crate) mod formulas;
 pub(crate) mod refined_curve;
+pub(crate) mod richer_form;
 pub(crate) mod second_effect;

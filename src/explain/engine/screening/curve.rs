@@ -13,7 +13,7 @@ use crate::explain::engine::terms::library::{CURVE, Port};
 const KNOTS: usize = 9;
 /// Knots that are nearer than this part of the range are one.
 const NEAREST: f64 = 0.03;
-/// Places and arguments that are tried: those of the best terms.
+/// Places and arguments that are tried: those of the best terms in equations, and of the best at inputs.
 const PAIRS: usize = 2;
 /// Added to the diagonal of the regression, as a part of it: the straight part of a curve may be what parameters do.
 const RIDGE: f64 = 1e-6;
@@ -89,22 +89,24 @@ pub(in crate::explain::engine) fn curves(
     gain: Option<&DMatrix<f64>>,
     whiten: &(dyn Fn(&crate::noise::Series) -> Vec<f64> + Sync),
 ) -> Vec<Lead> {
-    let mut pairs: Vec<(Place, usize)> = Vec::new();
-    for lead in leads {
-        let Some(argument) = lead.argument else {
-            continue;
-        };
-        let form = arguments[argument].form;
-        let of_one = matches!(form, ArgumentForm::Variable | ArgumentForm::Difference);
-        let fits = lead.term.port == Port::Equation && lead.term.memories.is_empty() && of_one;
-        if fits && !pairs.contains(&(lead.place, argument)) {
-            pairs.push((lead.place, argument));
+    let at_port = |port: Port| {
+        let mut pairs: Vec<(Place, usize)> = Vec::new();
+        let of_port = leads.iter().filter(|lead| lead.term.port == port);
+        for lead in of_port.filter(|lead| lead.term.memories.is_empty()) {
+            let Some(argument) = lead.argument else {
+                continue;
+            };
+            let form = arguments[argument].form;
+            let of_one = matches!(form, ArgumentForm::Variable | ArgumentForm::Difference);
+            if of_one && !pairs.contains(&(lead.place, argument)) {
+                pairs.push((lead.place, argument));
+            }
         }
-        if pairs.len() == PAIRS {
-            break;
-        }
-    }
-    let each = pairs.into_iter().filter_map(|(place, at)| {
+        pairs.truncate(PAIRS);
+        pairs
+    };
+    let pairs = [Port::Equation, Port::Input].into_iter().flat_map(at_port);
+    let each = pairs.filter_map(|(place, at)| {
         let argument = &arguments[at];
         let hook = hooked.places.iter().position(|p| *p == place)?;
         let knots = knots(argument);

@@ -1,6 +1,6 @@
 //! What a missing term may be a function of, with its values along the recordings.
 
-use crate::physics::{Binary, Equation, ModelSpec, Node, VariableId, VariableKind};
+use crate::physics::{Binary, Equation, ModelSpec, Node, Unknown, VariableId, VariableKind};
 
 use crate::explain::engine::terms::library::Needs;
 use crate::explain::engine::terms::names::{is_velocity, may_be_angle, may_be_velocity};
@@ -26,6 +26,8 @@ pub(crate) struct Argument {
     pub(crate) form: ArgumentForm,
     /// The plant declares it as the difference of two others.
     pub(crate) is_difference: bool,
+    /// Its derivative, where the plant has variables for that.
+    pub(crate) rate: Option<String>,
     pub(crate) angle: bool,
     pub(crate) velocity: bool,
     /// Changes at samples only: it is made of inputs.
@@ -65,6 +67,7 @@ impl Argument {
             angle: variables.len() == 1
                 && (unit(variables[0]) == "rad" || may_be_angle(spec, &variables)),
             is_difference: false,
+            rate: rate(spec, &variables),
             held,
             expression,
             variables,
@@ -109,6 +112,19 @@ impl Argument {
         (self.sorted.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
     }
 
+    /// Root mean square of its changes from sample to sample, for a unit of time.
+    pub(crate) fn rate_size(&self, sample_time: f64) -> f64 {
+        let changes = self
+            .values
+            .iter()
+            .flat_map(|v| v.windows(2))
+            .map(|w| w[1] - w[0]);
+        let (sum, count) = changes
+            .filter(|d| d.is_finite())
+            .fold((0.0, 0.0), |(sum, n), d| (sum + d * d, n + 1.0));
+        (sum / f64::max(count, 1.0)).sqrt() / sample_time
+    }
+
     /// Range of its integral, the largest of all recordings.
     pub(crate) fn travel(&self, sample_time: f64) -> f64 {
         let of = |values: &Vec<f64>| {
@@ -141,6 +157,41 @@ impl Argument {
             Needs::OwnState => self.form == ArgumentForm::Variable && !self.held,
             Needs::Time => false,
         }
+    }
+}
+
+/// The derivative of a variable, or of the difference of two, where the plant has it as `der(x) = v`.
+fn rate(spec: &ModelSpec, variables: &[VariableId]) -> Option<String> {
+    let of = |v: VariableId| {
+        let equation = spec
+            .equations
+            .iter()
+            .find(|e| e.unknown == Unknown::Derivative(v))?;
+        match spec.expressions.node(equation.rest) {
+            Node::Variable(rate) if equation.coefficient.is_none() => {
+                Some(spec.variable(rate).name.clone())
+            }
+            _ => None,
+        }
+    };
+    match *variables {
+        [v] => of(v).or_else(|| {
+            let equation = spec
+                .equations
+                .iter()
+                .find(|e| e.unknown == Unknown::Value(v))?;
+            let Node::Binary(Binary::Subtract, a, b) = spec.expressions.node(equation.rest) else {
+                return None;
+            };
+            let operands = (spec.expressions.node(a), spec.expressions.node(b));
+            let (Node::Variable(a), Node::Variable(b)) = operands else {
+                return None;
+            };
+            let whole = equation.coefficient.is_none();
+            whole.then(|| Some(format!("({} - {})", of(a)?, of(b)?)))?
+        }),
+        [a, b] => Some(format!("({} - {})", of(a)?, of(b)?)),
+        _ => None,
     }
 }
 
@@ -202,7 +253,7 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
             if source(a) && source(b) {
                 let text = format!("{}*{}", name(a), name(b));
                 let mut product = Argument::new(spec, text, vec![a, b]);
-                product.form = ArgumentForm::Product;
+                (product.form, product.rate) = (ArgumentForm::Product, None);
                 found.push(product);
             }
         }
@@ -229,7 +280,7 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
     }
     found.extend(radiation.into_iter().map(|(text, variables)| {
         let mut argument = Argument::new(spec, text, variables);
-        argument.form = ArgumentForm::Radiation;
+        (argument.form, argument.rate) = (ArgumentForm::Radiation, None);
         argument
     }));
     found

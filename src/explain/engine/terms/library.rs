@@ -55,6 +55,8 @@ pub(crate) enum Starts {
     Travel(&'static [f64]),
     /// Parts of the argument's range in a sample.
     Rate(&'static [f64]),
+    /// Parts of the root mean square of its rate.
+    RateSize(&'static [f64]),
     /// Numbers of samples.
     Samples(&'static [f64]),
     /// As they stand.
@@ -165,6 +167,41 @@ use Port::{Equation, Input, Parameter, Sensor};
 
 /// A function that nobody listed: its text is that of its pieces.
 pub(crate) const CURVE: Term = curve("curve", Equation, Anything, "", &[]);
+
+const ABOVE_DAMPED: Term = curve(
+    "above",
+    Equation,
+    Anything,
+    "max({z} - {from}, 0)*max({V} + {dz}, 0)/{V}",
+    &[shape("from", Starts::Quantiles(ABOVE), false), DAMPING],
+);
+const BELOW_DAMPED: Term = curve(
+    "below",
+    Equation,
+    Anything,
+    "min({z} - {from}, 0)*max({V} - {dz}, 0)/{V}",
+    &[shape("from", Starts::Quantiles(BELOW), false), DAMPING],
+);
+const BOTH_SIDES_DAMPED: Term = curve(
+    "both_sides",
+    Equation,
+    BothSigns,
+    "(max({z} - {from}, 0)*max({V} + {dz}, 0) + min({z} + {from}, 0)*max({V} - {dz}, 0))/{V}",
+    &[shape("from", Starts::SizeQuantiles(ABOVE), true), DAMPING],
+);
+/// Speed at which damping doubles the force of a contact.
+const DAMPING: Shape = shape("V", Starts::RateSize(&[1.0, 4.0]), true);
+
+/// The form of a term with one shape more, where its physics has one: a contact has damping in proportion to its depth
+/// (K. H. Hunt and F. R. E. Crossley, *J. Appl. Mech.* 42, 1975). It keeps the name.
+pub(in crate::explain::engine) fn richer(term: &Term) -> Option<&'static Term> {
+    match term.id {
+        "above" => Some(&ABOVE_DAMPED),
+        "below" => Some(&BELOW_DAMPED),
+        "both_sides" => Some(&BOTH_SIDES_DAMPED),
+        _ => None,
+    }
+}
 
 /// The library.
 pub(crate) const TERMS: &[Term] = &[

@@ -12,7 +12,7 @@ const TERM_ACCURACY: f64 = 1e-4;
 const FAST: f64 = 5.0;
 
 /// Values that a shape's search starts from.
-fn starts(
+pub(in crate::explain::engine) fn starts(
     shape: Starts,
     argument: Option<&Argument>,
     recordings: &[PlantRecording],
@@ -34,6 +34,7 @@ fn starts(
         Starts::Spread(parts) => of(parts, &|a, p| p * a.spread()),
         Starts::Travel(parts) => of(parts, &|a, p| p * a.travel(h)),
         Starts::Rate(parts) => of(parts, &|a, p| p * a.range() / h),
+        Starts::RateSize(parts) => of(parts, &|a, p| p * a.rate_size(h)),
         Starts::Waves(counts) => of(counts, &|_, n| n),
         Starts::Length(parts) => parts.iter().map(|p| p * samples as f64 * h).collect(),
         Starts::Instants(parts) => parts
