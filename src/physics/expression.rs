@@ -87,6 +87,8 @@ pub(crate) enum Node {
     Variable(VariableId),
     /// Time derivative of a state.
     Derivative(VariableId),
+    /// Value of a variable at the sample before: `pre(x)`.
+    Previous(VariableId),
     /// `-a`
     Negate(ExpressionId),
     /// `not a`
@@ -117,9 +119,11 @@ impl Node {
     /// The nodes that this one uses.
     pub(crate) fn operands(&self) -> impl Iterator<Item = ExpressionId> {
         let (a, b, c) = match *self {
-            Node::Number(_) | Node::Time | Node::Variable(_) | Node::Derivative(_) => {
-                (None, None, None)
-            }
+            Node::Number(_)
+            | Node::Time
+            | Node::Variable(_)
+            | Node::Derivative(_)
+            | Node::Previous(_) => (None, None, None),
             Node::Negate(a) | Node::Not(a) | Node::Call(_, a) => (Some(a), None, None),
             Node::Binary(_, a, b) => (Some(a), Some(b), None),
             Node::If { condition, yes, no } => (Some(condition), Some(yes), Some(no)),

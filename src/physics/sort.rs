@@ -4,6 +4,7 @@ mod classify;
 mod constants;
 mod failure;
 mod linear;
+mod previous;
 #[cfg(test)]
 mod tests;
 
@@ -38,6 +39,10 @@ pub(crate) fn determine(draft: Draft) -> Result<ModelSpec, Vec<SpecError>> {
         }
     }
     errors.extend(unsolved);
+    if errors.is_empty() {
+        let sound = previous::check(draft.text, &names, &kinds, &expressions, &equations);
+        errors.extend(sound.err());
+    }
     if !errors.is_empty() {
         return Err(errors);
     }

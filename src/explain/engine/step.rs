@@ -8,6 +8,7 @@ use super::fitting::finish::finished;
 use super::fitting::fitted::{Fitted, TIE, order, searched, with_more};
 use super::fitting::formulas::formulas;
 use super::fitting::refined_curve::refined_curve;
+use super::fitting::release::released;
 use super::fitting::richer_form::richer_form;
 use super::fitting::second_effect::drop_alike;
 use super::hypothesis::{Ground, trials};
@@ -254,6 +255,8 @@ pub(super) fn step(stage: &Stage) -> Step {
                 0 => inner.glance(&start, GLANCE)?,
                 _ => inner.refit(&start, 0, GLANCE)?,
             };
+            let again = |fit: &Fit| inner.refit(fit, 0, GLANCE);
+            let fitted = released(&inner, lead.term, parameters, fitted, &again);
             Some((from.deviance - fitted.deviance, lead, i, made, fitted))
         })
         .collect();

@@ -26,6 +26,8 @@ pub(super) struct Field<'a, const M: usize> {
     /// False until the frame of the Jacobian has the inputs of now.
     inputs_in_jacobian: bool,
     past: Vec<Past<M>>,
+    /// For each memory its value at the sample before each.
+    previous: Vec<Vec<Dual<M>>>,
     /// When each delayed input jumps within a sample, and in which order they do.
     jumps: Vec<Jump<M>>,
     /// Sample whose held value a delayed input has now, for each delay.
@@ -62,13 +64,35 @@ impl<'a, const M: usize> Field<'a, M> {
             sample: 0,
             inputs_in_jacobian: false,
             past: Vec::new(),
+            previous: Vec::new(),
             jumps: Vec::new(),
             source: Vec::new(),
         };
         field.jumps = field.jumps();
         field.source = vec![0; tape.delays.len()];
+        field.previous = field.memories();
         field.past = field.pasts();
         field
+    }
+
+    /// Values of the memories, one sample after the other: they depend on inputs and on their past only.
+    fn memories(&mut self) -> Vec<Vec<Dual<M>>> {
+        let tape = self.tape;
+        let mut all = vec![Vec::with_capacity(self.excitation.samples()); tape.memories.len()];
+        if tape.memories.is_empty() {
+            return all;
+        }
+        for k in 0..self.excitation.samples() {
+            for (all, memory) in all.iter_mut().zip(&tape.memories) {
+                let last = if k == 0 { memory.start } else { memory.value };
+                all.push(self.frame.slot[last]);
+            }
+            for (all, memory) in all.iter().zip(&tape.memories) {
+                self.frame.slot[memory.previous] = all[k];
+            }
+            self.begin(k);
+        }
+        all
     }
 
     /// Values of the arguments of delays that depend on inputs only.
@@ -110,6 +134,9 @@ impl<'a, const M: usize> Field<'a, M> {
         for (&slot, column) in self.tape.inputs.iter().zip(self.excitation.inputs) {
             let value = column[self.sample] + fraction * (column[next] - column[self.sample]);
             self.frame.slot[slot].value = value;
+        }
+        for (all, memory) in self.previous.iter().zip(&self.tape.memories) {
+            self.frame.slot[memory.previous] = all[self.sample];
         }
         self.tape.run_inputs(&mut self.frame);
         self.inputs_in_jacobian = false;
@@ -229,6 +256,9 @@ impl<'a, const M: usize> Field<'a, M> {
         if !self.inputs_in_jacobian {
             for &slot in &tape.inputs {
                 frame.slot[slot].value = self.frame.slot[slot].value;
+            }
+            for memory in &tape.memories {
+                frame.slot[memory.previous].value = self.frame.slot[memory.previous].value;
             }
             tape.run_inputs(frame);
             self.inputs_in_jacobian = true;

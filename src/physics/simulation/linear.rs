@@ -171,6 +171,10 @@ fn visit(
                 states: Degree::Other,
                 inputs: Degree::Other,
             },
+            Node::Previous(_) => Dependence {
+                states: Degree::Constant,
+                inputs: Degree::Other,
+            },
             Node::Variable(v) => of_variable[v.index()],
             Node::Derivative(v) => of_derivative[v.index()],
             Node::Negate(a) => of(a),

@@ -71,12 +71,22 @@ impl LinearPlant {
 pub(crate) struct Lineariser {
     tape: Tape,
     frame: Frame<LANES>,
+    /// Values of the memories at the last point.
+    memories: Vec<f64>,
 }
 
 impl Lineariser {
-    /// About a state, inputs and a time; what is delayed has the value that it has now.
+    /// About a state, inputs and a time; what is delayed has the value that it has now, and the sample before is the last
+    /// point.
     pub(crate) fn at(&mut self, state: &[f64], inputs: &[f64], time: f64) -> LinearPlant {
-        let Self { tape, frame } = self;
+        let Self {
+            tape,
+            frame,
+            memories,
+        } = self;
+        for (memory, &value) in tape.memories.iter().zip(&*memories) {
+            frame.slot[memory.previous] = Dual::constant(value);
+        }
         let (n, m, l) = (tape.states.len(), tape.inputs.len(), tape.outputs.len());
         let mut whole = DMatrix::zeros(n + l, n + m);
         frame.slot[tape.time] = Dual::constant(time);
@@ -108,6 +118,9 @@ impl Lineariser {
                 }
             }
         }
+        for (memory, value) in tape.memories.iter().zip(memories) {
+            *value = frame.slot[memory.value].value;
+        }
         LinearPlant {
             a: whole.view((0, 0), (n, n)).into_owned(),
             b: whole.view((0, n), (n, m)).into_owned(),
@@ -132,7 +145,13 @@ impl Plant {
             frame.slot[slot] = Dual::constant(value);
         }
         tape.run_parameters(&mut frame);
-        Lineariser { tape, frame }
+        let start = tape.memories.iter().map(|m| frame.slot[m.start].value);
+        let memories = start.collect();
+        Lineariser {
+            tape,
+            frame,
+            memories,
+        }
     }
 
     /// Linearises at a state, inputs and a time.

@@ -67,6 +67,17 @@ pub(super) struct DelaySlots {
     pub(super) of_inputs: bool,
 }
 
+/// A variable whose value at the sample before is used.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct MemorySlots {
+    /// Its value.
+    pub(super) value: usize,
+    /// Where that of the sample before is put.
+    pub(super) previous: usize,
+    /// Its value before the first sample.
+    pub(super) start: usize,
+}
+
 /// Equations as a flat program.
 #[derive(Debug, Clone)]
 pub(super) struct Tape {
@@ -88,6 +99,7 @@ pub(super) struct Tape {
     /// Slots of the values that the text gives to the parameters.
     pub(super) nominal: Vec<usize>,
     pub(super) delays: Vec<DelaySlots>,
+    pub(super) memories: Vec<MemorySlots>,
     /// Slot of every variable.
     pub(super) variables: Vec<usize>,
     /// Operand slots of each switch whose argument depends on states or time, and whether it depends on states.
@@ -132,6 +144,7 @@ struct Builder<'a> {
     instructions: Vec<(u32, Instruction)>,
     switches: Vec<SwitchSlots>,
     delays: Vec<DelaySlots>,
+    memories: Vec<(VariableId, u32)>,
     time: u32,
     variable: Vec<u32>,
     derivative: Vec<u32>,
@@ -234,6 +247,14 @@ impl Builder<'_> {
             Node::Time => self.time,
             Node::Variable(v) => self.variable[v.index()],
             Node::Derivative(v) => self.derivative[v.index()],
+            Node::Previous(v) => match self.memories.iter().find(|m| m.0 == v) {
+                Some(&(_, slot)) => slot,
+                None => {
+                    let slot = self.slot(Level::Inputs, true, false, source);
+                    self.memories.push((v, slot));
+                    slot
+                }
+            },
             Node::Negate(a) => self.emit(Operation::Negate, [at(a, self), NONE, NONE], source),
             Node::Not(a) => self.emit(Operation::Not, [at(a, self), NONE, NONE], source),
             Node::Call(Function::Sign, a) => {
@@ -313,6 +334,7 @@ impl Tape {
             instructions: Vec::new(),
             switches: Vec::new(),
             delays: Vec::new(),
+            memories: Vec::new(),
             time: 0,
             variable: vec![NONE; count],
             derivative: vec![NONE; count],
@@ -362,6 +384,13 @@ impl Tape {
             }
         }
         let zero = build.literal(0.0);
+        let memories: Vec<[u32; 3]> = (build.memories.clone().into_iter())
+            .map(|(v, previous)| {
+                let start = spec.variable(v).start;
+                let start = start.map_or(zero, |e| build.expression(e));
+                [build.variable[v.index()], previous, start]
+            })
+            .collect();
         let starts = spec
             .states()
             .iter()
@@ -372,7 +401,7 @@ impl Tape {
             .iter()
             .map(|&v| spec.variable(v).value.map_or(zero, |e| build.expression(e)))
             .collect();
-        build.finish(spec, starts, nominal)
+        build.finish(spec, starts, nominal, &memories)
     }
 
     /// Instructions of a level, without those of the levels before.
@@ -440,7 +469,13 @@ impl Tape {
 
 impl Builder<'_> {
     /// Renumbers the slots: leaves first, then instructions by level, each level in the order of emission.
-    fn finish(mut self, spec: &ModelSpec, starts: Vec<u32>, nominal: Vec<u32>) -> Tape {
+    fn finish(
+        mut self,
+        spec: &ModelSpec,
+        starts: Vec<u32>,
+        nominal: Vec<u32>,
+        memories: &[[u32; 3]],
+    ) -> Tape {
         let slots = self.level.len();
         let mut computed = vec![false; slots];
         self.instructions
@@ -506,6 +541,14 @@ impl Builder<'_> {
                     time: at(d.time as u32),
                     result: at(d.result as u32),
                     of_inputs: d.of_inputs,
+                })
+                .collect(),
+            memories: memories
+                .iter()
+                .map(|&[value, previous, start]| MemorySlots {
+                    value: at(value),
+                    previous: at(previous),
+                    start: at(start),
                 })
                 .collect(),
             switches: self

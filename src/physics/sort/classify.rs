@@ -132,6 +132,7 @@ fn uncertain(
         Node::Time => "`time` changes".to_string(),
         Node::Derivative(_) => "a derivative changes".to_string(),
         Node::Delay { .. } => "a delay needs something that changes".to_string(),
+        Node::Previous(_) => "`pre` is of something that changes".to_string(),
         _ => return None,
     };
     Some((id, found))

@@ -289,7 +289,7 @@ impl Evaluator<'_> {
             let value = match node {
                 Node::Number(value) => Some(value),
                 Node::Variable(v) => self.numbers.get(v.index()).copied(),
-                Node::Time | Node::Derivative(_) | Node::Delay { .. } => None,
+                Node::Time | Node::Derivative(_) | Node::Delay { .. } | Node::Previous(_) => None,
                 Node::Negate(a) => of(a).map(|a| -a),
                 Node::Not(a) => of(a).map(|a| 1.0 - a),
                 Node::Call(f, a) => of(a).map(|a| call(f, a)),

@@ -18,7 +18,7 @@ fn value(spec: &ModelSpec, id: ExpressionId, of: &dyn Fn(&str) -> f64) -> f64 {
     let v = |id| value(spec, id, of);
     match spec.expressions.node(id) {
         Node::Number(number) => number,
-        Node::Variable(x) | Node::Derivative(x) => of(&spec.variable(x).name),
+        Node::Variable(x) | Node::Derivative(x) | Node::Previous(x) => of(&spec.variable(x).name),
         Node::Negate(a) => -v(a),
         Node::Binary(f, a, b) => super::constants::binary(f, v(a), v(b)),
         Node::Call(f, a) => super::constants::call(f, v(a)),

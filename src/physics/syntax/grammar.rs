@@ -386,6 +386,9 @@ impl<'a> Parser<'a> {
     }
 
     fn call(&mut self, name: &'a str, span: Span) -> Result<Typed, SpecError> {
+        if name == "pre" && !self.declared.contains(name) {
+            return self.previous(span);
+        }
         let Some(callee) = names::function(name, &self.imports) else {
             return Err(self
                 .called_variable(name, span)
@@ -448,6 +451,20 @@ impl<'a> Parser<'a> {
         Ok(Typed::number(self.push(node, whole)?))
     }
 
+    /// What stands behind `pre`: the name of one variable.
+    fn previous(&mut self, start: Span) -> Result<Typed, SpecError> {
+        self.advance()?;
+        let (name, span) = (self.word(), self.span);
+        if self.token != Token::Name || names::is_reserved(name) {
+            return Err(self.syntax(span, "`pre` takes the name of one variable"));
+        }
+        self.advance()?;
+        self.require_sign(")", "behind the name: `pre` takes one variable")?;
+        let variable = self.symbols.number(name, span);
+        let node = Node::Previous(variable);
+        Ok(Typed::number(self.push(node, self.since(start.start))?))
+    }
+
     /// The error for the name of a variable before the `(` that stands here.
     fn called_variable(&self, name: &str, span: Span) -> Option<SpecError> {
         let behind = self.text.get(self.span.end..).unwrap_or("");
@@ -467,8 +484,9 @@ impl<'a> Parser<'a> {
 
     fn unknown_function(&self, name: &str, span: Span) -> SpecError {
         let advice = match name {
-            "pre" | "edge" | "change" | "sample" | "reinit" | "terminal" | "assert"
-            | "terminate" => "there are no events: write a condition with `if`, or leave it out",
+            "edge" | "change" | "sample" | "reinit" | "terminal" | "assert" | "terminate" => {
+                "there are no events: write a condition with `if`, or leave it out"
+            }
             "floor" | "ceil" | "integer" | "mod" | "rem" | "div" => {
                 "rounding is an event: write a condition with `if`"
             }

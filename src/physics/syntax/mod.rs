@@ -25,7 +25,8 @@
 //! sum         = [ "+" | "-" ] product { ( "+" | "-" ) product }
 //! product     = factor { ( "*" | "/" ) factor }
 //! factor      = primary [ "^" primary ]
-//! primary     = number | "true" | "false" | "time" | name | "der" "(" name ")" | "(" expression ")"
+//! primary     = number | "true" | "false" | "time" | name | "der" "(" name ")" | "pre" "(" name ")"
+//!             | "(" expression ")"
 //!             | function "(" [ expression { "," expression } ] ")"
 //! ```
 //!

@@ -267,6 +267,12 @@ impl<'a> Symbols<'a> {
                 Some(&Node::Variable(v)) => Node::Derivative(v),
                 _ => node,
             },
+            // Of a constant, the constant.
+            Node::Previous(v) => match table.get(v.index()) {
+                Some(&Node::Variable(v)) => Node::Previous(v),
+                Some(&constant) => constant,
+                None => node,
+            },
             node => node,
         });
         errors

@@ -28,6 +28,7 @@ fn show(spec: &ModelSpec, id: ExpressionId) -> String {
         Node::If { condition, yes, no } => {
             format!("(if {} then {} else {})", of(condition), of(yes), of(no))
         }
+        Node::Previous(v) => format!("pre({})", spec.variable(v).name),
         Node::Delay { value, time } => format!("delay({}, {})", of(value), of(time)),
     }
 }

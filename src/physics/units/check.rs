@@ -163,7 +163,9 @@ impl Checker<'_> {
                 scaled: true,
                 gain: false,
             },
-            Node::Variable(v) => self.spec.variable(v).unit.map_or(Known::Nothing, Known::is),
+            Node::Variable(v) | Node::Previous(v) => {
+                self.spec.variable(v).unit.map_or(Known::Nothing, Known::is)
+            }
             Node::Derivative(v) => self
                 .spec
                 .variable(v)

@@ -64,7 +64,9 @@ fn required(spec: &ModelSpec) -> Vec<Option<Unit>> {
         };
         match spec.expressions.node(id) {
             Node::Number(_) | Node::Time | Node::Not(_) => {}
-            Node::Variable(v) => of_variable[v.index()] = of_variable[v.index()].or(whole),
+            Node::Variable(v) | Node::Previous(v) => {
+                of_variable[v.index()] = of_variable[v.index()].or(whole)
+            }
             Node::Derivative(v) => {
                 let unit = whole.map(|u| u.times(&Unit::SECOND));
                 of_variable[v.index()] = of_variable[v.index()].or(unit);

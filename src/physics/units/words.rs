@@ -88,7 +88,7 @@ impl<'a> Words<'a> {
                     Node::Number(power) => waiting.push((a, exponent * power)),
                     _ => return None,
                 },
-                Node::Variable(v) => {
+                Node::Variable(v) | Node::Previous(v) => {
                     let text = self.spec.variable(v).unit_text.as_deref()?;
                     answer.push((shortened(text), exponent));
                 }

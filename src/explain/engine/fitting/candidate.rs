@@ -1,6 +1,6 @@
 //! A lead made into a plant that can be fitted.
 
-use crate::explain::engine::fitting::edit::{Edit, NewParameter, Place, acting, literal};
+use crate::explain::engine::fitting::edit::{Edit, NewParameter, Place, acting};
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::{Port, Starts};
@@ -125,16 +125,12 @@ pub(crate) fn candidate(
         } else {
             text.clone()
         };
-        edit.declarations.push(format!(
-            "Real {name}(start={}, fixed=true);",
-            literal(first)
-        ));
-        edit.equations.push(format!(
-            "der({name}) = {};",
-            filled(memory.rate, term, &source, &memories, &shapes, h)
-        ));
+        let previous = memory.previous(&memories);
+        let rate = filled(memory.rate, term, &source, &previous, &shapes, h);
+        edit.declarations.push(memory.declaration(name, first));
+        edit.equations.push(memory.equation(name, &rate));
     }
-    let new_states = memories.len();
+    let new_states = term.memories.iter().filter(|m| !m.sampled).count();
     let added = if let Some(curve) = &lead.curve {
         let names: Vec<String> = (1..=curve.values.len())
             .map(|i| free_name(spec, &format!("{}_{i}", term.id)))

@@ -90,6 +90,8 @@ pub(in crate::explain::engine) fn searched(lead: &Lead, recordings: &[PlantRecor
             Starts::Waves(_) => 7.0,
             // As many frequencies as the spectrum of the recording has.
             Starts::Peaks => 2.0 * (samples / 2.0).ln(),
+            // As many as are tried: see `Screen`.
+            Starts::Releases(_) => 2.0 * 100f64.ln(),
             Starts::Quantiles(_) | Starts::SizeQuantiles(_) => 2.5,
             Starts::Spread(_)
             | Starts::Samples(_)

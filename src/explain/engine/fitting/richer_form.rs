@@ -18,9 +18,11 @@ pub(in crate::explain::engine) fn richer_form(
 ) -> Option<Fitted> {
     let term = richer(fitted.lead.term)?;
     let argument = &arguments[fitted.lead.argument?];
-    argument.rate.as_ref()?;
     let first = ground.study.parameters() + fitted.shapes.len();
-    let strength = fitted.fit.point[first];
+    let strength = match term.free_strength {
+        true => fitted.fit.point[first],
+        false => 1.0,
+    };
     let new = term.shapes.last()?;
     let each = starts(new.starts, Some(argument), ground.recordings, &[]);
     each.into_par_iter()

@@ -48,7 +48,7 @@ fn uses(spec: &ModelSpec, root: ExpressionId, v: VariableId) -> bool {
     let mut stack = vec![root];
     while let Some(id) = stack.pop() {
         let node = spec.expressions.node(id);
-        if node == Node::Variable(v) || node == Node::Derivative(v) {
+        if [Node::Variable(v), Node::Derivative(v), Node::Previous(v)].contains(&node) {
             return true;
         }
         stack.extend(node.operands());

@@ -16,7 +16,9 @@ pub(super) fn variables(spec: &ModelSpec, root: ExpressionId) -> Vec<String> {
     while let Some(id) = stack.pop() {
         let node = spec.expressions.node(id);
         let name = match node {
-            Node::Variable(v) | Node::Derivative(v) => Some(spec.variable(v).name.clone()),
+            Node::Variable(v) | Node::Derivative(v) | Node::Previous(v) => {
+                Some(spec.variable(v).name.clone())
+            }
             Node::Time => Some("time".to_owned()),
             _ => None,
         };

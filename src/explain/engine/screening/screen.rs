@@ -16,7 +16,7 @@ use crate::explain::engine::terms::argument::{Argument, ArgumentForm, arguments}
 use crate::explain::engine::terms::library::{Needs, Port, Starts, TERMS, Term};
 use crate::explain::engine::terms::names::{heats_itself, is_without_units, rank_of};
 use crate::explain::engine::terms::values::{Instance, evaluate, grid};
-use crate::explain::engine::thresholds::significant;
+use crate::explain::engine::thresholds::{IMITATED, significant};
 use crate::explain::explanation::EquationMap;
 use crate::noise::Series;
 use crate::physics::estimate::{Fit, PlantRecording, Study};
@@ -27,6 +27,9 @@ const BATCH: usize = 64;
 
 /// Instants tried on either side of the best, each time in an interval so many times shorter.
 const BETWEEN: usize = 8;
+/// Ratios of the sizes at which something snaps that are tried after each other: the pattern of releases of a wandering input is
+/// another one after a few per cent.
+const RELEASES: [f64; 2] = [1.04, 1.01];
 
 /// Terms whose columns differ by less than this angle are one: 1e-4 of the statistic of either tells them apart.
 const SAME: f64 = 0.01;
@@ -210,7 +213,7 @@ pub(crate) fn screen(
     let count = leads.len();
     let found: Vec<Lead> = TERMS
         .par_iter()
-        .flat_map_iter(|term| tests.between_instants(term, &leads))
+        .flat_map_iter(|term| tests.between(term, &leads))
         .collect();
     leads.extend(found);
     leads.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
@@ -262,7 +265,8 @@ impl Tests<'_> {
                 continue;
             }
             let argument = instance.argument.map(|a| &self.arguments[a]);
-            let held = argument.is_some_and(|a| a.held) && instance.term.memories.is_empty();
+            let held = argument.is_some_and(|a| a.held)
+                && instance.term.memories.iter().all(|m| m.sampled);
             let mut test = |place: Place, sensor: bool, series: &Series| {
                 let column = self.fit.noise.whiten_kept(series, self.study.mask());
                 if let Some(tested) = self.projection.test(column, instance.term.free_strength) {
@@ -354,30 +358,77 @@ impl Tests<'_> {
         leads
     }
 
-    /// A change between the instants that were tested, to the sample: descent cannot find it, because within a sample a change
-    /// has no slope and the statistic has more than one optimum.
-    fn between_instants(&self, term: &'static Term, tested: &[Lead]) -> Vec<Lead> {
+    /// Shapes between those that were tested, where descent cannot find the best, because what a recording says of them changes in
+    /// jumps: instants, to the sample, and sizes at which something snaps.
+    fn between(&self, term: &'static Term, tested: &[Lead]) -> Vec<Lead> {
         let of_term = || tested.iter().filter(|l| l.term == term);
         let strongest = of_term().max_by(|a, b| a.statistic.total_cmp(&b.statistic));
-        let (Some(mut best), [shape]) = (strongest.cloned(), term.shapes) else {
+        let (Some(best), [shape]) = (strongest.cloned(), term.shapes) else {
             return vec![];
         };
-        let Starts::Instants(parts) = shape.starts else {
-            return vec![];
-        };
+        match shape.starts {
+            Starts::Instants(parts) => {
+                let apart = self.study.duration() * (parts[1] - parts[0]);
+                let mut rounds = Vec::new();
+                let mut step = apart;
+                while step > self.recordings[0].sample_time {
+                    step /= BETWEEN as f64;
+                    rounds.push(step);
+                }
+                let moved = |at: f64, k: f64, step: f64| at + k * step;
+                self.rounds(best, &rounds, BETWEEN - 1, &moved)
+            }
+            Starts::Releases(parts) => {
+                let most = tested.iter().map(|l| l.statistic).fold(0.0, f64::max);
+                if best.statistic < IMITATED * most {
+                    return vec![];
+                }
+                // The first round goes over all that were tested.
+                let whole = (parts[parts.len() - 1] / parts[0]).ln();
+                let first = RELEASES[0].ln();
+                let count = (whole / first).ceil() as usize;
+                let moved = |at: f64, k: f64, step: f64| at * (k * step).exp();
+                let mut found = self.rounds(best.clone(), &[first], count, &moved);
+                let strongest = found
+                    .iter()
+                    .max_by(|a, b| a.statistic.total_cmp(&b.statistic));
+                let best = strongest
+                    .filter(|l| l.statistic > best.statistic)
+                    .cloned()
+                    .unwrap_or(best);
+                let finer: Vec<f64> = RELEASES[1..].iter().map(|r| r.ln()).collect();
+                found.extend(self.rounds(best, &finer, BETWEEN - 1, &moved));
+                found
+            }
+            _ => vec![],
+        }
+    }
+
+    /// So many steps to either side of the best, which may move it, in each round.
+    fn rounds(
+        &self,
+        mut best: Lead,
+        steps: &[f64],
+        count: usize,
+        moved: &(dyn Fn(f64, f64, f64) -> f64 + Sync),
+    ) -> Vec<Lead> {
         let mut found = Vec::new();
-        let mut apart = self.study.duration() * (parts[1] - parts[0]);
-        while apart > self.recordings[0].sample_time {
-            apart /= BETWEEN as f64;
-            let finer: Vec<Instance> = (1..BETWEEN)
-                .flat_map(|k| [-1.0, 1.0].map(|sign| sign * k as f64 * apart))
-                .map(|shift| Instance {
-                    term,
+        for &step in steps {
+            let finer: Vec<Instance> = (1..=count)
+                .flat_map(|k| [-1.0, 1.0].map(|sign| sign * k as f64))
+                .map(|k| Instance {
+                    term: best.term,
                     argument: best.argument,
-                    shapes: vec![best.shapes[0] + shift],
+                    shapes: vec![moved(best.shapes[0], k, step)],
                 })
                 .collect();
-            let leads = self.of(&finer);
+            let leads: Vec<Lead> = match best.term.memories {
+                [] => self.of(&finer),
+                _ => finer
+                    .par_chunks(1)
+                    .flat_map_iter(|one| self.of(one))
+                    .collect(),
+            };
             let strongest = leads
                 .iter()
                 .max_by(|a, b| a.statistic.total_cmp(&b.statistic));

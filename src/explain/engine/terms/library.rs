@@ -45,6 +45,9 @@ pub(crate) enum Starts {
     SizeQuantiles(&'static [f64]),
     /// Parts of the argument's standard deviation.
     Spread(&'static [f64]),
+    /// The same of sizes at which something snaps: what a recording says of them changes in jumps, and the screen looks between
+    /// these for the best.
+    Releases(&'static [f64]),
     /// Parts of its inverse: wave numbers `2 pi n / range`.
     Waves(&'static [f64]),
     /// Parts of the recording's length.
@@ -83,9 +86,10 @@ pub(crate) enum MemoryStart {
 /// A state of a term's own: `{m}`, and `{p}` for a second one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Memory {
-    /// Its derivative.
+    /// Its derivative, or, of one that changes at samples only, its value, where it stands for the value before.
     pub(crate) rate: &'static str,
     pub(crate) start: MemoryStart,
+    pub(crate) sampled: bool,
 }
 
 /// What stands for the memories in a form.
@@ -189,16 +193,61 @@ const BOTH_SIDES_DAMPED: Term = curve(
     "(max({z} - {from}, 0)*max({V} + {dz}, 0) + min({z} + {from}, 0)*max({V} - {dz}, 0))/{V}",
     &[shape("from", Starts::SizeQuantiles(ABOVE), true), DAMPING],
 );
+const BACKLASH_LAGGING: Term = in_place(
+    "input_backlash",
+    &[LAG, sampled("min(max({p}, {z} - {g}), {z} + {g})")],
+    &[BACKLASH, LAG_TIME],
+);
+const STICTION_LAGGING: Term = in_place(
+    "valve_stiction",
+    &[LAG, sampled("if abs({z} - {p}) > {S} then {z} else {p}")],
+    &[STICTION, LAG_TIME],
+);
+const BACKLASH: Shape = shape("g", Starts::Spread(&[0.02, 0.1, 0.3]), true);
+const STICTION: Shape = shape(
+    "S",
+    Starts::Releases(&[0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0]),
+    true,
+);
+const LAG_TIME: Shape = shape("T", Starts::Samples(&[0.3, 1.0]), true);
+/// Follows the second memory.
+const LAG: Memory = Memory {
+    rate: "({p} - {m})/{T}",
+    start: MemoryStart::Argument,
+    sampled: false,
+};
+
+/// A memory that changes at samples only.
+const fn sampled(value: &'static str) -> Memory {
+    Memory {
+        rate: value,
+        start: MemoryStart::Argument,
+        sampled: true,
+    }
+}
+
+/// What acts in place of an input.
+const fn in_place(id: &'static str, memories: &'static [Memory], shapes: &'static [Shape]) -> Term {
+    Term {
+        memories,
+        free_strength: false,
+        symbol: "",
+        ..curve(id, Input, Anything, "{m} - {z}", shapes)
+    }
+}
+
 /// Speed at which damping doubles the force of a contact.
 const DAMPING: Shape = shape("V", Starts::RateSize(&[1.0, 4.0]), true);
 
 /// The form of a term with one shape more, where its physics has one: a contact has damping in proportion to its depth
-/// (K. H. Hunt and F. R. E. Crossley, *J. Appl. Mech.* 42, 1975). It keeps the name.
+/// (K. H. Hunt and F. R. E. Crossley, *J. Appl. Mech.* 42, 1975), and an actuator with play or stiction has a lag. It keeps the name.
 pub(in crate::explain::engine) fn richer(term: &Term) -> Option<&'static Term> {
     match term.id {
         "above" => Some(&ABOVE_DAMPED),
         "below" => Some(&BELOW_DAMPED),
         "both_sides" => Some(&BOTH_SIDES_DAMPED),
+        "input_backlash" => Some(&BACKLASH_LAGGING),
+        "valve_stiction" => Some(&STICTION_LAGGING),
         _ => None,
     }
 }
@@ -237,6 +286,7 @@ pub(crate) const TERMS: &[Term] = &[
         memories: &[Memory {
             rate: "({z} - abs({z})*{m})/{s}",
             start: MemoryStart::Zero,
+            sampled: false,
         }],
         shapes: &[shape("s", Starts::Travel(&[0.003, 0.02, 0.1, 0.4]), true)],
         free_strength: true,
@@ -252,6 +302,7 @@ pub(crate) const TERMS: &[Term] = &[
         memories: &[Memory {
             rate: "({z} - abs({z})*{m}/(1 + {r}*exp(-abs({z})/{vs})))/{s}",
             start: MemoryStart::Zero,
+            sampled: false,
         }],
         shapes: &[
             shape("s", Starts::Travel(&[0.003]), true),
@@ -273,10 +324,12 @@ pub(crate) const TERMS: &[Term] = &[
             Memory {
                 rate: "{z} - {p}",
                 start: MemoryStart::Zero,
+                sampled: false,
             },
             Memory {
                 rate: "{m}/{T}^2 + {D}*({z} - {p})/{T}",
                 start: MemoryStart::Argument,
+                sampled: false,
             },
         ],
         shapes: &[
@@ -297,6 +350,7 @@ pub(crate) const TERMS: &[Term] = &[
         memories: &[Memory {
             rate: "({z} - {m})/{T}",
             start: MemoryStart::Argument,
+            sampled: false,
         }],
         shapes: &[
             shape("f", Starts::Share(&[0.3]), true),
@@ -316,10 +370,12 @@ pub(crate) const TERMS: &[Term] = &[
             Memory {
                 rate: "{z} - {p}",
                 start: MemoryStart::Zero,
+                sampled: false,
             },
             Memory {
                 rate: "(max({m} - {g}, 0) + min({m} + {g}, 0))/{T}^2 + {D}*({z} - {p})/{T}",
                 start: MemoryStart::Argument,
+                sampled: false,
             },
         ],
         shapes: &[
@@ -434,6 +490,7 @@ pub(crate) const TERMS: &[Term] = &[
         memories: &[Memory {
             rate: "({z}^2 - {m})/{T}",
             start: MemoryStart::Square,
+            sampled: false,
         }],
         shapes: &[shape("T", Starts::Length(&[0.02, 0.1, 0.4]), true)],
         free_strength: true,
@@ -514,51 +571,24 @@ pub(crate) const TERMS: &[Term] = &[
         memories: &[Memory {
             rate: "({z} - {m})/{T}",
             start: MemoryStart::Argument,
+            sampled: false,
         }],
         shapes: &[shape("T", Starts::Samples(&[0.5, 2.0, 6.0, 20.0]), true)],
         free_strength: false,
         symbol: "",
         units: &[],
     },
-    Term {
-        id: "input_backlash",
-        port: Input,
-        needs: Anything,
-        form: "{m} - {z}",
-        memories: &[Memory {
-            rate: "(max({z} - {g} - {m}, 0) + min({z} + {g} - {m}, 0))*{fast}",
-            start: MemoryStart::Argument,
-        }],
-        shapes: &[shape("g", Starts::Spread(&[0.02, 0.1, 0.3]), true)],
-        free_strength: false,
-        symbol: "",
-        units: &[],
-    },
-    // A valve that sticks until its signal is `S` away, and then slips to it: {p} is 1 while it moves.
-    Term {
-        id: "valve_stiction",
-        port: Input,
-        needs: Anything,
-        form: "{m} - {z}",
-        memories: &[
-            Memory {
-                rate: "{fast}*{p}*({z} - {m})",
-                start: MemoryStart::Argument,
-            },
-            Memory {
-                rate: "{fast}*(0.5 + 0.5*tanh(8*(abs({z} - {m})/{S} - 1 + 0.9*{p})) - {p})",
-                start: MemoryStart::Zero,
-            },
-        ],
-        shapes: &[shape(
-            "S",
-            Starts::Spread(&[0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0]),
-            true,
-        )],
-        free_strength: false,
-        symbol: "",
-        units: &[],
-    },
+    in_place(
+        "input_backlash",
+        &[sampled("min(max({m}, {z} - {g}), {z} + {g})")],
+        &[BACKLASH],
+    ),
+    // A valve that sticks until its signal is `S` away, and then slips to it.
+    in_place(
+        "valve_stiction",
+        &[sampled("if abs({z} - {m}) > {S} then {z} else {m}")],
+        &[STICTION],
+    ),
     Term {
         id: "input_rate_limit",
         port: Input,
@@ -567,6 +597,7 @@ pub(crate) const TERMS: &[Term] = &[
         memories: &[Memory {
             rate: "min(max(({z} - {m})*{fast}, -{R}), {R})",
             start: MemoryStart::Argument,
+            sampled: false,
         }],
         shapes: &[shape(
             "R",
@@ -588,6 +619,7 @@ pub(crate) const TERMS: &[Term] = &[
         memories: &[Memory {
             rate: "({z} - {m})/{T}",
             start: MemoryStart::Argument,
+            sampled: false,
         }],
         shapes: &[shape("T", Starts::Samples(&[0.5, 2.0, 6.0, 20.0]), true)],
         free_strength: false,

@@ -2,7 +2,7 @@
 
 use crate::explain::engine::fitting::edit::literal;
 use crate::explain::engine::terms::argument::Argument;
-use crate::explain::engine::terms::library::{MEMORIES, MemoryStart, Starts, Term};
+use crate::explain::engine::terms::library::{MEMORIES, Memory, MemoryStart, Starts, Term};
 use crate::physics::estimate::PlantRecording;
 use crate::physics::{Excitation, Hold, Plant, parse};
 
@@ -31,7 +31,7 @@ pub(in crate::explain::engine) fn starts(
     match shape {
         Starts::Quantiles(parts) => of(parts, &|a, p| a.quantile(p)),
         Starts::SizeQuantiles(parts) => of(parts, &|a, p| a.size_quantile(p)),
-        Starts::Spread(parts) => of(parts, &|a, p| p * a.spread()),
+        Starts::Spread(parts) | Starts::Releases(parts) => of(parts, &|a, p| p * a.spread()),
         Starts::Travel(parts) => of(parts, &|a, p| p * a.travel(h)),
         Starts::Rate(parts) => of(parts, &|a, p| p * a.range() / h),
         Starts::RateSize(parts) => of(parts, &|a, p| p * a.rate_size(h)),
@@ -123,7 +123,7 @@ pub(in crate::explain::engine) fn evaluate(
         }
         let mut equations = String::from("equation\n");
         for (i, instance) in instances.iter().enumerate() {
-            let name = instance.argument.map_or(String::new(), |a| format!("z{a}"));
+            let argument = instance.argument.map_or(String::new(), |a| format!("z{a}"));
             let shapes: Vec<String> = instance
                 .shapes
                 .iter()
@@ -134,7 +134,7 @@ pub(in crate::explain::engine) fn evaluate(
                 .collect();
             // What stands at the place is what parameters scale, and a size of the term does not matter here.
             let fill = |form: &str| {
-                filled(form, instance.term, &name, &memories, &shapes, h)
+                filled(form, instance.term, &argument, &memories, &shapes, h)
                     .replace("{v}", "0.0")
                     .replace("{a}", "1.0")
             };
@@ -142,9 +142,11 @@ pub(in crate::explain::engine) fn evaluate(
             equations.push_str(&format!("b{i} = {};\n", fill(instance.term.form)));
             for (memory, name) in instance.term.memories.iter().zip(&memories) {
                 let first = instance.argument.map_or(0.0, |a| arguments[a].values[r][0]);
-                let start = literal(memory.start.at(first));
-                text.push_str(&format!("Real {name}(start={start}, fixed=true);\n"));
-                equations.push_str(&format!("der({name}) = {};\n", fill(memory.rate)));
+                let start = memory.start.at(first);
+                text.push_str(&memory.declaration(name, start));
+                let previous = memory.previous(&memories);
+                let rate = filled(memory.rate, instance.term, &argument, &previous, &shapes, h);
+                equations.push_str(&memory.equation(name, &rate));
             }
         }
         let plant = Plant::new(parse(&format!("{text}{equations}end Terms;\n")).ok()?)
@@ -166,6 +168,30 @@ pub(in crate::explain::engine) fn evaluate(
         }
     }
     Some(columns)
+}
+
+impl Memory {
+    /// Its declaration in a text.
+    pub(crate) fn declaration(&self, name: &str, start: f64) -> String {
+        format!("Real {name}(start={}, fixed=true);", literal(start))
+    }
+
+    /// What its equation calls the memories: those of the sample before.
+    pub(crate) fn previous(&self, names: &[String]) -> Vec<String> {
+        let previous = |name: &String| format!("pre({name})");
+        match self.sampled {
+            true => names.iter().map(previous).collect(),
+            false => names.to_vec(),
+        }
+    }
+
+    /// Its equation in a text.
+    pub(crate) fn equation(&self, name: &str, right: &str) -> String {
+        match self.sampled {
+            true => format!("{name} = {right};"),
+            false => format!("der({name}) = {right};"),
+        }
+    }
 }
 
 impl MemoryStart {
