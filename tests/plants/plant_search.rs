@@ -147,3 +147,94 @@ fn an_overflow_is_found_beside_what_nobody_measures() {
         said["summary"]
     );
 }
+
+/// A tank with an outlet, filled by a pump.
+const TANK: &str = r#"model Tank "tank with an outlet"
+  parameter Real A(unit="m2", min=0.4, max=0.6) = 0.5 "cross-section";
+  parameter Real a(unit="m2", min=0.008, max=0.02) = 0.012 "outlet";
+  parameter Real kp(unit="m3/(s.V)", min=0.005, max=0.02) = 0.01 "pump";
+  input Real u(unit="V") "pump voltage";
+  output Real level(unit="m");
+  Real h(unit="m", start=0.5);
+equation
+  A*der(h) = kp*u - a*sqrt(2*9.81*max(h, 0));
+  level = h;
+end Tank;
+"#;
+
+/// The answer for a tank whose pump is driven by what `acting` makes of the recorded voltage.
+fn tank(mut acting: impl FnMut(f64) -> f64, seed: u64) -> Value {
+    let folder = Folder::new();
+    folder.text("tank.mo", TANK);
+    let mut dice = ChaCha8Rng::seed_from_u64(seed);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut dice) };
+    let mut text = String::from("t,u,level\n");
+    let (mut h, mut wander) = (0.52f64, 0.0f64);
+    for k in 0..1500 {
+        wander += 0.15 * normal() - 0.02 * wander;
+        let u = 4.0 + wander;
+        writeln!(text, "{k},{u},{}", h + 0.001 * normal()).unwrap();
+        let pump = acting(u);
+        for _ in 0..20 {
+            h += 0.05 * (0.0098 * pump - 0.0125 * (2.0 * 9.81 * h.max(0.0)).sqrt()) / 0.52;
+        }
+    }
+    folder.text("log.csv", &text);
+    let files = [
+        "explain",
+        "log.csv",
+        "--simulation",
+        "tank.mo",
+        "--output",
+        "e.json",
+    ];
+    folder.run(&files).ok();
+    json(&folder.join("e.json"))
+}
+
+#[test]
+fn a_pump_that_sticks_is_told_from_play() {
+    let mut held = 4.0f64;
+    let said = tank(
+        |u| {
+            if (u - held).abs() > 0.45 {
+                held = u;
+            }
+            held
+        },
+        3,
+    );
+    let effect = &said["effects"][0];
+    assert_eq!(effect["effect"], "valve_stiction", "{}", said["summary"]);
+    let size = effect["parameters"]["valve_stiction_S"]["value"]
+        .as_f64()
+        .unwrap();
+    assert!((size - 0.45).abs() < 0.02, "{size}");
+}
+
+#[test]
+fn a_characteristic_that_nobody_listed_is_found_at_its_input() {
+    let said = tank(|u| u + 0.5 * (2.5 * u).sin(), 4);
+    let effect = &said["effects"][0];
+    assert_eq!(effect["effect"], "law", "{}", said["summary"]);
+    assert_eq!(
+        (&effect["enters"], &effect["depends"][0]),
+        (&"u".into(), &"u".into())
+    );
+    // Beyond a constant and a slope, which the pump's gain and the outlet may hold, it is the sine.
+    let law = &effect["law"];
+    let column = |key: &str| -> Vec<f64> {
+        let values = law[key].as_array().unwrap().iter();
+        values.map(|v| v.as_f64().unwrap()).collect()
+    };
+    let (at, value) = (column("at"), column("value"));
+    let wave: Vec<f64> = at.iter().map(|u| 0.5 * (2.5 * u).sin()).collect();
+    let bend = |y: &[f64]| -> Vec<f64> { y.windows(3).map(|w| w[0] - 2.0 * w[1] + w[2]).collect() };
+    let (found, wanted) = (bend(&value), bend(&wave));
+    let dot: f64 = found.iter().zip(&wanted).map(|(a, b)| a * b).sum();
+    let size = |v: &[f64]| v.iter().map(|a| a * a).sum::<f64>().sqrt();
+    assert!(
+        dot > 0.8 * size(&found) * size(&wanted),
+        "{found:?}\n{wanted:?}"
+    );
+}

@@ -364,10 +364,11 @@ pub(super) fn step(stage: &Stage) -> Step {
     }
     if let Some((screen, _)) = tried.first() {
         let close = |f: &&mut Fitted| f.gain > (1.0 - TIE.1) * best && f.hypothesis.is_none();
-        for one in fitted.iter_mut().filter(close) {
-            if let Some(richer) = richer_form(one, &screen.arguments, &ground) {
-                *one = richer;
-            }
+        let gain = |a: &&mut Fitted, b: &&mut Fitted| a.gain.total_cmp(&b.gain);
+        if let Some(one) = fitted.iter_mut().filter(close).max_by(gain)
+            && let Some(richer) = richer_form(one, &screen.arguments, &ground)
+        {
+            *one = richer;
         }
     }
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));

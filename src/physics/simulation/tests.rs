@@ -89,3 +89,59 @@ fn states_of_any_size_are_no_divergence_and_have_scales_of_their_own() {
     let run = plant.simulate(&point, &excitation, None).expect("a run");
     assert!((run.outputs[0][399] - 21.0).abs() < 1e-6);
 }
+
+/// A tank behind a valve with play `g` and one that sticks until `S`.
+const VALVES: &str = "model M parameter Real g = 0.2; parameter Real S = 0.3; parameter Real c = 0.5; input Real u; output Real y;
+     output Real stuck; Real p(start=0.1); Real q(start=0.1); Real h(start=0.4);
+     equation p = min(max(pre(p), u - g), u + g); q = if abs(u - pre(q)) > S then u else pre(q);
+     der(h) = p + q - c*h; y = h; stuck = q; end M;";
+
+#[test]
+fn what_a_valve_was_at_the_sample_before_is_exact() {
+    let plant = Plant::new(parse(VALVES).expect("a plant"));
+    let u: Vec<f64> = (0..300)
+        .map(|k| (0.07 * f64::from(k)).sin() + 0.4 * (0.31 * f64::from(k)).cos())
+        .collect();
+    let excitation = Excitation {
+        inputs: &[&u],
+        length: u.len(),
+        sample_time: 0.1,
+        start_time: 0.0,
+        hold: Hold::Zero,
+    };
+    let point = plant.nominal();
+    let run = plant.simulate(&point, &excitation, None).expect("a run");
+    let (mut p, mut q, mut h) = (0.1f64, 0.1f64, 0.4f64);
+    for (k, &u) in u.iter().enumerate() {
+        p = p.max(u - 0.2).min(u + 0.2);
+        if (u - q).abs() > 0.3 {
+            q = u;
+        }
+        assert!((run.outputs[0][k] - h).abs() < 1e-8, "sample {k}");
+        assert_eq!(run.outputs[1][k], q, "sample {k}");
+        let rest = (p + q) / 0.5;
+        h = rest + (h - rest) * (-0.05f64).exp();
+    }
+    // The play moves with its width; where a valve that sticks lets go does not change by little.
+    let directions: Vec<Direction> = (0..3).map(Direction::Parameter).collect();
+    let slopes = plant.sensitivities(&point, &excitation, None, &run.plan, &directions);
+    for (i, slope) in slopes[0].iter().enumerate() {
+        let step = 1e-6;
+        let at = |sign: f64| {
+            let mut moved = point.clone();
+            moved.parameters[i] += sign * step;
+            plant.simulate(&moved, &excitation, None).expect("a run")
+        };
+        let (above, below) = (at(1.0), at(-1.0));
+        for (k, s) in slope.iter().enumerate() {
+            let difference = (above.outputs[0][k] - below.outputs[0][k]) / (2.0 * step);
+            assert!((difference - s).abs() < 1e-5, "parameter {i}, sample {k}");
+        }
+    }
+    // Linearised at one sample after the other, it remembers too.
+    let mut lineariser = plant.lineariser(&point);
+    for (k, &u) in u.iter().enumerate() {
+        let linear = lineariser.at(&[run.states[0][k]], &[u], excitation.time(k));
+        assert_eq!(linear.output[1], run.outputs[1][k], "sample {k}");
+    }
+}

@@ -448,3 +448,39 @@ fn independent_errors_are_all_reported() {
         8
     );
 }
+
+#[test]
+fn the_sample_before_is_known_of_what_changes_at_samples_only() {
+    let with = |equations: &str| {
+        message(&format!(
+            "model M parameter Real k = 1; input Real u; output Real y; Real p(start=1); Real x; equation {equations} end M;"
+        ))
+    };
+    assert_eq!(
+        with("der(x) = p - x; p = 0.5*pre(p) + k*u; y = x;"),
+        "no error"
+    );
+    for (equations, why) in [
+        (
+            "der(x) = u; p = x + pre(p); y = p;",
+            "`p` follows from the state `x`",
+        ),
+        (
+            "der(x) = u; p = u; y = pre(x) + p;",
+            "`x` follows from its derivative",
+        ),
+        (
+            "der(x) = u; p = time; y = pre(p);",
+            "`p` follows from `time`",
+        ),
+        (
+            "der(x) = u; p = u; y = p + pre(u);",
+            "`u` follows from no equation",
+        ),
+    ] {
+        let said = with(equations);
+        assert!(said.contains(why), "{equations}: {said}");
+    }
+    let said = with("der(x) = u; p = pre(u + 1); y = p;");
+    assert!(said.contains("`pre` takes"), "{said}");
+}

@@ -8,7 +8,7 @@ use crate::physics::spec::ModelSpec;
 /// Passes over the equations: in each, what is known reaches the next variable of a chain.
 const PASSES: usize = 4;
 
-/// The unit of every variable in words, as declared, or as the equations require it; none where they leave it open. What a
+/// The unit of every variable in words, as declared, or as the equations require it; none where they leave it or its scale open. What a
 /// literal may carry is taken as a pure number.
 pub(crate) fn units_in_words(spec: &ModelSpec) -> Vec<Option<String>> {
     let mut known = spec.clone();
@@ -31,7 +31,7 @@ pub(crate) fn units_in_words(spec: &ModelSpec) -> Vec<Option<String>> {
         .iter()
         .map(|v| match (&v.unit_text, v.unit) {
             (Some(text), _) => Some(text.clone()),
-            (None, unit) => unit.map(|unit| words.readable(unit)),
+            (None, unit) => unit.and_then(|unit| words.inferred(unit)),
         })
         .collect()
 }
@@ -159,5 +159,22 @@ mod tests {
         assert_eq!(of("F"), "N");
         // The inverse of that of `c`.
         assert_eq!(of("odd"), "m/kg");
+    }
+
+    #[test]
+    fn a_prefix_leaves_the_scale_of_what_follows_open() {
+        let text = "model Oven
+               parameter Real C(unit=\"kJ/K\") = 5; parameter Real most = 2; parameter Real c = 0.1;
+               parameter Real lag = 3; input Real Q(unit=\"kW\"); output Real y(unit=\"K\");
+               Real T(unit=\"K\"); Real q;
+             equation
+               lag*der(q) = Q - q; C*der(T) = min(q, most) - c*T^2; y = T;
+             end Oven;";
+        let spec = parse(text).expect("a plant");
+        let units = units_in_words(&spec);
+        let of = |name: &str| units[spec.find(name).expect("a variable").index()].clone();
+        assert_eq!(of("most").as_deref(), Some("kW"));
+        assert_eq!(of("lag").as_deref(), Some("s"));
+        assert_eq!(of("c"), None);
     }
 }

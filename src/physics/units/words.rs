@@ -36,6 +36,31 @@ impl<'a> Words<'a> {
         declared.map_or_else(|| unit.to_string(), |d| shortened(d.1))
     }
 
+    /// The same of a unit that follows from others. Where some have a prefix or another scale, its dimension says no factor: it is
+    /// known only where the model has one unit of that dimension; a time is in seconds.
+    pub(super) fn inferred(&self, unit: Unit) -> Option<String> {
+        let texts = self
+            .spec
+            .variables
+            .iter()
+            .filter_map(|v| Some((v.unit?, v.unit_text.as_deref()?)));
+        // Differences in degC are those in K.
+        let scaled = |text: &str| !symbols::is_coherent(&text.replace("degC", "K"));
+        let mut scaled = texts.clone().filter(|(_, text)| scaled(text));
+        if scaled.next().is_none() || unit.is_one() {
+            return Some(self.readable(unit));
+        }
+        let alike: HashSet<&str> = texts
+            .filter(|(u, _)| u.same(&unit))
+            .map(|(_, text)| text)
+            .collect();
+        match alike.len() {
+            0 if unit.same(&Unit::SECOND) => Some("s".to_owned()),
+            1 => alike.into_iter().next().map(str::to_owned),
+            _ => None,
+        }
+    }
+
     /// The unit of an expression: as declared where it has one, else the nearest one that reads well.
     pub(super) fn unit_text(&self, id: ExpressionId, unit: Unit) -> String {
         match self.product(id).as_deref() {

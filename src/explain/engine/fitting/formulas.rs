@@ -12,6 +12,7 @@ use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::{Needs, Port, Starts, Term, curve, shape};
 use crate::explain::engine::terms::values::{Instance, evaluate, grid};
 use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
+use crate::physics::estimate::{Fit, Study};
 
 const WIDTHS: Starts = Starts::Spread(&[0.1, 0.2, 0.5, 1.0, 2.0]);
 const MIDDLES: Starts = Starts::Quantiles(&[0.1, 0.3, 0.5, 0.7, 0.9]);
@@ -66,7 +67,8 @@ pub(in crate::explain::engine) fn formulas(
         .par_iter()
         .filter_map(|near| {
             let start = (&near.shapes[..], near.strength);
-            in_its_place(best, near.term, start, arguments, ground)
+            let refit = |study: &Study, from: &Fit| study.refit(from, ROUNDS, THOROUGH);
+            in_its_place(best, near.term, start, &refit, arguments, ground)
         })
         .collect()
 }
@@ -138,11 +140,12 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
     Some(found)
 }
 
-/// Another term at the place of a fit, from these values of its shapes and its strength.
+/// Another term at the place of a fit, fitted from these values of its shapes and its strength.
 pub(super) fn in_its_place(
     best: &Fitted,
     term: &'static Term,
     (shapes, strength): (&[f64], f64),
+    fitted: &dyn Fn(&Study, &Fit) -> Option<Fit>,
     arguments: &[Argument],
     ground: &Ground,
 ) -> Option<Fitted> {
@@ -157,7 +160,7 @@ pub(super) fn in_its_place(
     let parameters = study.parameters();
     let without = best.without_term(parameters);
     let start = made.from(&without, parameters);
-    let fit = inner.refit(&start, ROUNDS, THOROUGH)?;
+    let fit = fitted(&inner, &start)?;
     Some(Fitted {
         gain: ground.fit.criterion - fit.criterion - searched(&lead, ground.recordings),
         shapes: fit.point[parameters..][..lead.shapes.len()].to_vec(),

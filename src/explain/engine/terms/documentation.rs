@@ -229,7 +229,7 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
     effect(
         "end_stop",
         "stop at the end of the travel",
-        "m*der(v) = ... + k*(max(x - c, 0) + min(x + c, 0)), or one side of it",
+        "m*der(v) = ... + k*(max(x - c, 0) + min(x + c, 0)), or one side of it; with damping max(1 +- v/V, 0) where the recording shows it",
         ANY_EQUATION,
         A_POSITION,
         &[
@@ -495,7 +495,7 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
     effect(
         "input_backlash",
         "play of an actuator",
-        "u becomes m, which follows u when it differs by more than g",
+        "u becomes m = min(max(pre(m), u - g), u + g), perhaps with a lag T",
         AN_INPUT,
         ITSELF,
         &[like(
@@ -506,7 +506,7 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
     effect(
         "valve_stiction",
         "valve that sticks and slips",
-        "u becomes m, which stays until u is S away and then moves to it",
+        "u becomes m = if abs(u - pre(m)) > S then u else pre(m), perhaps with a lag T",
         AN_INPUT,
         ITSELF,
         &[like(
