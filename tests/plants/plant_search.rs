@@ -229,12 +229,17 @@ fn a_characteristic_that_nobody_listed_is_found_at_its_input() {
     };
     let (at, value) = (column("at"), column("value"));
     let wave: Vec<f64> = at.iter().map(|u| 0.5 * (2.5 * u).sin()).collect();
-    let bend = |y: &[f64]| -> Vec<f64> { y.windows(3).map(|w| w[0] - 2.0 * w[1] + w[2]).collect() };
-    let (found, wanted) = (bend(&value), bend(&wave));
+    let line = |y: &[f64]| -> Vec<f64> {
+        let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+        let (x0, y0) = (mean(&at), mean(y));
+        let product: f64 = at.iter().zip(y).map(|(x, y)| (x - x0) * (y - y0)).sum();
+        let slope = product / at.iter().map(|x| (x - x0).powi(2)).sum::<f64>();
+        let each = at.iter().zip(y);
+        each.map(|(x, y)| y - y0 - slope * (x - x0)).collect()
+    };
+    let (found, wanted) = (line(&value), line(&wave));
     let dot: f64 = found.iter().zip(&wanted).map(|(a, b)| a * b).sum();
     let size = |v: &[f64]| v.iter().map(|a| a * a).sum::<f64>().sqrt();
-    assert!(
-        dot > 0.8 * size(&found) * size(&wanted),
-        "{found:?}\n{wanted:?}"
-    );
+    let cosine = dot / (size(&found) * size(&wanted));
+    assert!(cosine > 0.95, "{cosine}: {at:?}\n{found:?}\n{wanted:?}");
 }

@@ -47,16 +47,21 @@ pub(super) fn check(
             continue;
         };
         let why = match kinds[v.index()] {
-            VariableKind::Algebraic => moves[v.index()].clone(),
-            VariableKind::State => Some("its derivative".to_owned()),
-            _ => Some("no equation".to_owned()),
+            VariableKind::Algebraic => {
+                let why = moves[v.index()].clone();
+                why.map(|why| format!("{} follows from {why}", quoted(v)))
+            }
+            VariableKind::State => Some(format!("{} is a state", quoted(v))),
+            _ => Some(format!(
+                "write `q = {0}` and `pre(q)`",
+                shortened(names[v.index()])
+            )),
         };
         if let Some(why) = why {
             let message = format!(
                 "`pre({})` is the value at the sample before, and needs a variable whose equation has inputs, parameters and \
-                 `pre` only; {} follows from {why}",
+                 `pre` only; {why}",
                 shortened(names[v.index()]),
-                quoted(v),
             );
             let span = expressions.span(id);
             return Err(SpecError::new(text, span, SpecErrorKind::Value(message)));

@@ -465,18 +465,12 @@ fn the_sample_before_is_known_of_what_changes_at_samples_only() {
             "der(x) = u; p = x + pre(p); y = p;",
             "`p` follows from the state `x`",
         ),
-        (
-            "der(x) = u; p = u; y = pre(x) + p;",
-            "`x` follows from its derivative",
-        ),
+        ("der(x) = u; p = u; y = pre(x) + p;", "`x` is a state"),
         (
             "der(x) = u; p = time; y = pre(p);",
             "`p` follows from `time`",
         ),
-        (
-            "der(x) = u; p = u; y = p + pre(u);",
-            "`u` follows from no equation",
-        ),
+        ("der(x) = u; p = u; y = p + pre(u);", "write `q = u`"),
     ] {
         let said = with(equations);
         assert!(said.contains(why), "{equations}: {said}");

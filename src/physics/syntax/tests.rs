@@ -156,7 +156,7 @@ fn wrong_expressions_say_what_is_wrong() {
         ),
         (
             "pre(a)",
-            "`pre` is outside the flat subset of Modelica: there are no events: write a condition with `if`, or leave it out",
+            "`pre(a)` is the value at the sample before, and needs a variable whose equation has inputs, parameters and `pre` only; write `q = a` and `pre(q)`",
         ),
         (
             "der(a + b)",

@@ -15,6 +15,8 @@ const KNOTS: usize = 9;
 const NEAREST: f64 = 0.03;
 /// Places and arguments that are tried: those of the best terms in equations, and of the best at inputs.
 const PAIRS: usize = 2;
+/// Statistics that differ by less than this part are rounding.
+const SAME: f64 = 1e-6;
 /// Added to the diagonal of the regression, as a part of it: the straight part of a curve may be what parameters do.
 const RIDGE: f64 = 1e-6;
 
@@ -105,7 +107,7 @@ pub(in crate::explain::engine) fn curves(
         pairs.truncate(PAIRS);
         pairs
     };
-    let pairs = [Port::Equation, Port::Input].into_iter().flat_map(at_port);
+    let pairs = [Port::Input, Port::Equation].into_iter().flat_map(at_port);
     let each = pairs.filter_map(|(place, at)| {
         let argument = &arguments[at];
         let hook = hooked.places.iter().position(|p| *p == place)?;
@@ -143,7 +145,17 @@ pub(in crate::explain::engine) fn curves(
             lead
         })
     });
-    let mut found: Vec<Lead> = each.collect();
+    let mut found: Vec<Lead> = Vec::new();
+    for lead in each {
+        // A function of an input that enters one equation is the same in that equation: it is said of the input.
+        let same = |f: &Lead| {
+            let apart = (f.statistic - lead.statistic).abs();
+            f.argument == lead.argument && apart < SAME * lead.statistic
+        };
+        if !found.iter().any(same) {
+            found.push(lead);
+        }
+    }
     found.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
     found
 }
