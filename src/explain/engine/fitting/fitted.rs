@@ -110,9 +110,9 @@ fn prefer_special_case(spec: &ModelSpec, fitted: &mut [Fitted]) {
     let tie = TIE_WITH_CURVE.0.max(TIE_WITH_CURVE.1 * first.gain);
     let least = first.gain - tie;
     if let Some(wanted) = special_case(named(spec, first))
-        && let Some(at) = fitted
-            .iter()
-            .position(|f| named(spec, f) == wanted && f.gain >= least)
+        && let Some(at) = fitted.iter().position(|f| {
+            named(spec, f) == wanted && f.lead.place == first.lead.place && f.gain >= least
+        })
     {
         fitted[..=at].rotate_right(1);
     }

@@ -83,13 +83,19 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
     effect(
         "hysteresis",
         "memory of the direction",
-        "m*der(v) = ... + c*z, der(z) = (v - abs(v)*z)/s",
-        ANY_EQUATION,
-        "the rate of what is remembered: a speed, a current",
-        &[like(
-            "coulomb_friction",
-            "Move to and fro by less than the friction's usual travel: hysteresis springs back.",
-        )],
+        "m*der(v) = ... + c*z, der(z) = (v - abs(v)*z)/s; or u becomes u + c*z, where z goes to 1 the way u moves",
+        "any equation or input",
+        "the rate of what is remembered: a speed, a current; at an input, the input itself",
+        &[
+            like(
+                "coulomb_friction",
+                "Move to and fro by less than the friction's usual travel: hysteresis springs back.",
+            ),
+            like(
+                "input_backlash",
+                "Reverse the input by a little: play does nothing until it is taken up.",
+            ),
+        ],
     ),
     effect(
         "extra_mode",

@@ -83,7 +83,7 @@ pub(crate) enum MemoryStart {
     Zero,
 }
 
-/// A state of a term's own: `{m}`, and `{p}` for a second one.
+/// A memory of a term: `{m}`, then `{p}` and `{q}`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Memory {
     /// Its derivative, or, of one that changes at samples only, its value, where it stands for the value before.
@@ -93,7 +93,7 @@ pub(crate) struct Memory {
 }
 
 /// What stands for the memories in a form.
-pub(crate) const MEMORIES: [&str; 2] = ["{m}", "{p}"];
+pub(crate) const MEMORIES: [&str; 3] = ["{m}", "{p}", "{q}"];
 
 /// A number that shapes a term.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -203,6 +203,31 @@ const STICTION_LAGGING: Term = in_place(
     &[LAG, sampled("if abs({z} - {p}) > {S} then {z} else {p}")],
     &[STICTION, LAG_TIME],
 );
+const HYSTERESIS_LAGGING: Term = hysteresis(
+    &[
+        Memory {
+            start: MemoryStart::Zero,
+            ..LAG
+        },
+        Memory {
+            rate: "sign({z} - {q}) + ({p} - sign({z} - {q}))*exp(-abs({z} - {q})/{w})",
+            start: MemoryStart::Zero,
+            sampled: true,
+        },
+        sampled("{z}"),
+    ],
+    &[HYSTERESIS, LAG_TIME],
+);
+const HYSTERESIS: Shape = shape("w", Starts::Spread(&[0.1, 0.3, 1.0]), true);
+
+/// Hysteresis of an input with these memories.
+const fn hysteresis(memories: &'static [Memory], shapes: &'static [Shape]) -> Term {
+    Term {
+        memories,
+        ..curve("input_hysteresis", Input, Anything, "{m}", shapes)
+    }
+}
+
 const BACKLASH: Shape = shape("g", Starts::Spread(&[0.02, 0.1, 0.3]), true);
 const STICTION: Shape = shape(
     "S",
@@ -248,6 +273,7 @@ pub(in crate::explain::engine) fn richer(term: &Term) -> Option<&'static Term> {
         "both_sides" => Some(&BOTH_SIDES_DAMPED),
         "input_backlash" => Some(&BACKLASH_LAGGING),
         "valve_stiction" => Some(&STICTION_LAGGING),
+        "input_hysteresis" => Some(&HYSTERESIS_LAGGING),
         _ => None,
     }
 }
@@ -582,6 +608,18 @@ pub(crate) const TERMS: &[Term] = &[
         "input_backlash",
         &[sampled("min(max({m}, {z} - {g}), {z} + {g})")],
         &[BACKLASH],
+    ),
+    // Magnetic or piezoelectric: goes to 1 the way the input moves (Dahl's curve), and holds where it stands.
+    hysteresis(
+        &[
+            Memory {
+                rate: "sign({z} - {p}) + ({m} - sign({z} - {p}))*exp(-abs({z} - {p})/{w})",
+                start: MemoryStart::Zero,
+                sampled: true,
+            },
+            sampled("{z}"),
+        ],
+        &[HYSTERESIS],
     ),
     // A valve that sticks until its signal is `S` away, and then slips to it.
     in_place(

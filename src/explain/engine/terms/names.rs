@@ -145,7 +145,11 @@ pub(crate) fn family(id: &str) -> &str {
 
 /// The special case of a form that has a name too.
 pub(in crate::explain::engine) fn special_case(id: &str) -> Option<&'static str> {
-    (id == "stribeck_friction").then_some("coulomb_friction")
+    match id {
+        "stribeck_friction" => Some("coulomb_friction"),
+        "hysteresis" => Some("input_backlash"),
+        _ => None,
+    }
 }
 
 /// Bristles that yield within this part of the travel are dry friction.
@@ -175,6 +179,7 @@ pub(crate) fn called(
     match (term.port, term.id) {
         (Port::Sensor, id) => id,
         (Port::Input, "input_square" | "input_cube") => "input_curve",
+        (Port::Input, "input_hysteresis") => "hysteresis",
         (Port::Input, id) => id,
         (Port::Parameter, "parameter_step" | "parameter_ramp") => "parameter_change",
         (Port::Parameter, "parameter_heating")
