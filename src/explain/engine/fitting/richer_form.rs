@@ -6,7 +6,7 @@ use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
 use crate::explain::engine::fitting::formulas::in_its_place;
 use crate::explain::engine::hypothesis::Ground;
 use crate::explain::engine::terms::argument::Argument;
-use crate::explain::engine::terms::library::richer;
+use crate::explain::engine::terms::richer::richer;
 use crate::explain::engine::terms::values::starts;
 use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::{Fit, Study};

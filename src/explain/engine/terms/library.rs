@@ -157,8 +157,8 @@ pub(in crate::explain::engine) const fn curve(
     }
 }
 
-const ABOVE: &[f64] = &[0.5, 0.7, 0.85, 0.94, 0.98];
-const BELOW: &[f64] = &[0.5, 0.3, 0.15, 0.06, 0.02];
+pub(super) const ABOVE: &[f64] = &[0.5, 0.7, 0.85, 0.94, 0.98];
+pub(super) const BELOW: &[f64] = &[0.5, 0.3, 0.15, 0.06, 0.02];
 const TIMES: &[f64] = &[
     0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85,
     0.9, 0.95,
@@ -172,78 +172,16 @@ use Port::{Equation, Input, Parameter, Sensor};
 /// A function that nobody listed: its text is that of its pieces.
 pub(crate) const CURVE: Term = curve("curve", Equation, Anything, "", &[]);
 
-const ABOVE_DAMPED: Term = curve(
-    "above",
-    Equation,
-    Anything,
-    "max({z} - {from}, 0)*max({V} + {dz}, 0)/{V}",
-    &[shape("from", Starts::Quantiles(ABOVE), false), DAMPING],
-);
-const BELOW_DAMPED: Term = curve(
-    "below",
-    Equation,
-    Anything,
-    "min({z} - {from}, 0)*max({V} - {dz}, 0)/{V}",
-    &[shape("from", Starts::Quantiles(BELOW), false), DAMPING],
-);
-const BOTH_SIDES_DAMPED: Term = curve(
-    "both_sides",
-    Equation,
-    BothSigns,
-    "(max({z} - {from}, 0)*max({V} + {dz}, 0) + min({z} + {from}, 0)*max({V} - {dz}, 0))/{V}",
-    &[shape("from", Starts::SizeQuantiles(ABOVE), true), DAMPING],
-);
-const BACKLASH_LAGGING: Term = in_place(
-    "input_backlash",
-    &[LAG, sampled("min(max({p}, {z} - {g}), {z} + {g})")],
-    &[BACKLASH, LAG_TIME],
-);
-const STICTION_LAGGING: Term = in_place(
-    "valve_stiction",
-    &[LAG, sampled("if abs({z} - {p}) > {S} then {z} else {p}")],
-    &[STICTION, LAG_TIME],
-);
-const HYSTERESIS_LAGGING: Term = hysteresis(
-    &[
-        Memory {
-            start: MemoryStart::Zero,
-            ..LAG
-        },
-        Memory {
-            rate: "sign({z} - {q}) + ({p} - sign({z} - {q}))*exp(-abs({z} - {q})/{w})",
-            start: MemoryStart::Zero,
-            sampled: true,
-        },
-        sampled("{z}"),
-    ],
-    &[HYSTERESIS, LAG_TIME],
-);
-const HYSTERESIS: Shape = shape("w", Starts::Spread(&[0.1, 0.3, 1.0]), true);
-
-/// Hysteresis of an input with these memories.
-const fn hysteresis(memories: &'static [Memory], shapes: &'static [Shape]) -> Term {
-    Term {
-        memories,
-        ..curve("input_hysteresis", Input, Anything, "{m}", shapes)
-    }
-}
-
-const BACKLASH: Shape = shape("g", Starts::Spread(&[0.02, 0.1, 0.3]), true);
-const STICTION: Shape = shape(
+pub(super) const BACKLASH: Shape = shape("g", Starts::Spread(&[0.02, 0.1, 0.3]), true);
+pub(super) const STICTION: Shape = shape(
     "S",
     Starts::Releases(&[0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0]),
     true,
 );
-const LAG_TIME: Shape = shape("T", Starts::Samples(&[0.3, 1.0]), true);
-/// Follows the second memory.
-const LAG: Memory = Memory {
-    rate: "({p} - {m})/{T}",
-    start: MemoryStart::Argument,
-    sampled: false,
-};
+pub(super) const HYSTERESIS: Shape = shape("w", Starts::Spread(&[0.1, 0.3, 1.0]), true);
 
 /// A memory that changes at samples only.
-const fn sampled(value: &'static str) -> Memory {
+pub(super) const fn sampled(value: &'static str) -> Memory {
     Memory {
         rate: value,
         start: MemoryStart::Argument,
@@ -252,7 +190,11 @@ const fn sampled(value: &'static str) -> Memory {
 }
 
 /// What acts in place of an input.
-const fn in_place(id: &'static str, memories: &'static [Memory], shapes: &'static [Shape]) -> Term {
+pub(super) const fn in_place(
+    id: &'static str,
+    memories: &'static [Memory],
+    shapes: &'static [Shape],
+) -> Term {
     Term {
         memories,
         free_strength: false,
@@ -261,20 +203,11 @@ const fn in_place(id: &'static str, memories: &'static [Memory], shapes: &'stati
     }
 }
 
-/// Speed at which damping doubles the force of a contact.
-const DAMPING: Shape = shape("V", Starts::RateSize(&[1.0, 4.0]), true);
-
-/// The form of a term with one shape more, where its physics has one: a contact has damping in proportion to its depth
-/// (K. H. Hunt and F. R. E. Crossley, *J. Appl. Mech.* 42, 1975), and an actuator with play or stiction has a lag. It keeps the name.
-pub(in crate::explain::engine) fn richer(term: &Term) -> Option<&'static Term> {
-    match term.id {
-        "above" => Some(&ABOVE_DAMPED),
-        "below" => Some(&BELOW_DAMPED),
-        "both_sides" => Some(&BOTH_SIDES_DAMPED),
-        "input_backlash" => Some(&BACKLASH_LAGGING),
-        "valve_stiction" => Some(&STICTION_LAGGING),
-        "input_hysteresis" => Some(&HYSTERESIS_LAGGING),
-        _ => None,
+/// Hysteresis of an input with these memories.
+pub(super) const fn hysteresis(memories: &'static [Memory], shapes: &'static [Shape]) -> Term {
+    Term {
+        memories,
+        ..curve("input_hysteresis", Input, Anything, "{m}", shapes)
     }
 }
 

@@ -4,4 +4,5 @@ pub(crate) mod argument;
 pub(crate) mod documentation;
 pub(crate) mod library;
 pub(crate) mod names;
+pub(crate) mod richer;
 pub(crate) mod values;
