@@ -16,7 +16,7 @@ use crate::explain::engine::terms::argument::{Argument, ArgumentForm, arguments}
 use crate::explain::engine::terms::library::{Needs, Port, Starts, TERMS, Term};
 use crate::explain::engine::terms::names::{heats_itself, is_without_units, rank_of};
 use crate::explain::engine::terms::values::{Instance, evaluate, grid};
-use crate::explain::engine::thresholds::{IMITATED, significant};
+use crate::explain::engine::thresholds::significant;
 use crate::explain::explanation::EquationMap;
 use crate::noise::Series;
 use crate::physics::estimate::{Fit, PlantRecording, Study};
@@ -29,7 +29,10 @@ const BATCH: usize = 64;
 const BETWEEN: usize = 8;
 /// Ratios of the sizes at which something snaps that are tried after each other: the pattern of releases of a wandering input is
 /// another one after a few per cent.
-const RELEASES: [f64; 2] = [1.04, 1.01];
+const RELEASES: [f64; 2] = [1.05, 1.01];
+/// They are tried where the best at first has this part of the strongest test: a pattern that is half wrong still has half of the
+/// right one's.
+const NEAR: f64 = 0.5;
 
 /// Terms whose columns differ by less than this angle are one: 1e-4 of the statistic of either tells them apart.
 const SAME: f64 = 0.01;
@@ -361,65 +364,84 @@ impl Tests<'_> {
     /// Shapes between those that were tested, where descent cannot find the best, because what a recording says of them changes in
     /// jumps: instants, to the sample, and sizes at which something snaps.
     fn between(&self, term: &'static Term, tested: &[Lead]) -> Vec<Lead> {
-        let of_term = || tested.iter().filter(|l| l.term == term);
-        let strongest = of_term().max_by(|a, b| a.statistic.total_cmp(&b.statistic));
-        let (Some(best), [shape]) = (strongest.cloned(), term.shapes) else {
+        let Some((shape, others)) = term.shapes.split_first() else {
             return vec![];
         };
+        // The strongest with each value of the other shapes.
+        let mut best: Vec<&Lead> = Vec::new();
+        for lead in tested.iter().filter(|l| l.term == term) {
+            match best.iter_mut().find(|b| b.shapes[1..] == lead.shapes[1..]) {
+                Some(known) if known.statistic < lead.statistic => *known = lead,
+                Some(_) => {}
+                None => best.push(lead),
+            }
+        }
         match shape.starts {
-            Starts::Instants(parts) => {
-                let apart = self.study.duration() * (parts[1] - parts[0]);
+            Starts::Instants(parts) if others.is_empty() => {
                 let mut rounds = Vec::new();
-                let mut step = apart;
+                let mut step = self.study.duration() * (parts[1] - parts[0]);
                 while step > self.recordings[0].sample_time {
                     step /= BETWEEN as f64;
                     rounds.push(step);
                 }
-                let moved = |at: f64, k: f64, step: f64| at + k * step;
-                self.rounds(best, &rounds, BETWEEN - 1, &moved)
+                let moved = |at: f64, k: f64, step: f64| Some(at + k * step);
+                let each = best.into_iter();
+                each.flat_map(|b| self.rounds(b, &rounds, BETWEEN - 1, &moved))
+                    .collect()
             }
             Starts::Releases(parts) => {
                 let most = tested.iter().map(|l| l.statistic).fold(0.0, f64::max);
-                if best.statistic < IMITATED * most {
-                    return vec![];
-                }
-                // The first round goes over all that were tested.
+                let close = best.into_iter().filter(|b| b.statistic >= NEAR * most);
                 let whole = (parts[parts.len() - 1] / parts[0]).ln();
-                let first = RELEASES[0].ln();
-                let count = (whole / first).ceil() as usize;
-                let moved = |at: f64, k: f64, step: f64| at * (k * step).exp();
-                let mut found = self.rounds(best.clone(), &[first], count, &moved);
-                let strongest = found
-                    .iter()
-                    .max_by(|a, b| a.statistic.total_cmp(&b.statistic));
-                let best = strongest
-                    .filter(|l| l.statistic > best.statistic)
-                    .cloned()
-                    .unwrap_or(best);
-                let finer: Vec<f64> = RELEASES[1..].iter().map(|r| r.ln()).collect();
-                found.extend(self.rounds(best, &finer, BETWEEN - 1, &moved));
-                found
+                let [first, finer] = RELEASES.map(f64::ln);
+                let of = |best: &Lead| {
+                    let tested = tested
+                        .iter()
+                        .filter(|l| (l.term, l.argument) == (term, best.argument));
+                    let (least, most) = tested.fold((f64::INFINITY, 0.0f64), |(least, most), l| {
+                        (least.min(l.shapes[0]), most.max(l.shapes[0]))
+                    });
+                    let moved = |at: f64, k: f64, step: f64| {
+                        let size = at * (k * step).exp();
+                        (least..=most).contains(&size).then_some(size)
+                    };
+                    // The first round goes over all that were tested.
+                    let count = (whole / first).ceil() as usize;
+                    let mut found = self.rounds(best, &[first], count, &moved);
+                    let strongest = found.iter().chain([best]);
+                    let strongest = strongest.max_by(|a, b| a.statistic.total_cmp(&b.statistic));
+                    if let Some(best) = strongest.cloned() {
+                        found.extend(self.rounds(&best, &[finer], BETWEEN - 1, &moved));
+                    }
+                    found
+                };
+                close.flat_map(of).collect()
             }
             _ => vec![],
         }
     }
 
-    /// So many steps to either side of the best, which may move it, in each round.
+    /// So many steps of the first shape to either side of the best, which may move it, in each round.
     fn rounds(
         &self,
-        mut best: Lead,
+        best: &Lead,
         steps: &[f64],
         count: usize,
-        moved: &(dyn Fn(f64, f64, f64) -> f64 + Sync),
+        moved: &dyn Fn(f64, f64, f64) -> Option<f64>,
     ) -> Vec<Lead> {
+        let mut best = best.clone();
         let mut found = Vec::new();
         for &step in steps {
             let finer: Vec<Instance> = (1..=count)
                 .flat_map(|k| [-1.0, 1.0].map(|sign| sign * k as f64))
-                .map(|k| Instance {
-                    term: best.term,
-                    argument: best.argument,
-                    shapes: vec![moved(best.shapes[0], k, step)],
+                .filter_map(|k| {
+                    let mut shapes = best.shapes.clone();
+                    shapes[0] = moved(shapes[0], k, step)?;
+                    Some(Instance {
+                        term: best.term,
+                        argument: best.argument,
+                        shapes,
+                    })
                 })
                 .collect();
             let leads: Vec<Lead> = match best.term.memories {

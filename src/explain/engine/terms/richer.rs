@@ -3,8 +3,8 @@
 use super::library::Needs::{Anything, BothSigns};
 use super::library::Port::Equation;
 use super::library::{
-    ABOVE, BACKLASH, BELOW, HYSTERESIS, Memory, MemoryStart, STICTION, Shape, Starts, Term, curve,
-    hysteresis, in_place, sampled, shape,
+    ABOVE, BACKLASH, BELOW, HYSTERESIS, Memory, MemoryStart, STICTION, STOP, Shape, Starts, Term,
+    curve, hysteresis, in_place, sampled, shape,
 };
 
 /// The form of a term with one shape more: a contact has damping in proportion to its depth (K. H. Hunt and F. R. E. Crossley,
@@ -61,8 +61,11 @@ const BACKLASH_LAGGING: Term = in_place(
 );
 const STICTION_LAGGING: Term = in_place(
     "valve_stiction",
-    &[LAG, sampled("if abs({z} - {p}) > {S} then {z} else {p}")],
-    &[STICTION, LAG_TIME],
+    &[
+        LAG,
+        sampled("if abs({z} - {p}) > {S} then {z} - {j}*{S}*sign({z} - {p}) else {p}"),
+    ],
+    &[STICTION, STOP, LAG_TIME],
 );
 const HYSTERESIS_LAGGING: Term = hysteresis(
     &[
