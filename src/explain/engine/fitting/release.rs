@@ -12,7 +12,7 @@ const COUNT: i32 = 15;
 /// Searches, each with a fit of everything else after it.
 const SEARCHES: usize = 4;
 
-/// A fit with the sizes of a term that are searched so, and the shares that go with them, each search followed by a fit from there; `first` is the place of the
+/// A fit with the sizes of a term that are searched so, each search followed by a fit from there; `first` is the place of the
 /// term's first number.
 pub(in crate::explain::engine) fn released(
     study: &Study,
@@ -22,11 +22,8 @@ pub(in crate::explain::engine) fn released(
     again: &dyn Fn(&Fit) -> Option<Fit>,
 ) -> Fit {
     let releases = |s: &Shape| matches!(s.starts, Starts::Releases(_));
-    if !term.shapes.iter().any(releases) {
-        return fit;
-    }
     let places = term.shapes.iter().zip(first..);
-    let places = places.filter(|(s, _)| releases(s) || matches!(s.starts, Starts::Share(_)));
+    let places = places.filter(|(s, _)| releases(s));
     for (_, place) in places {
         for _ in 0..SEARCHES {
             let at = |k: i32| {

@@ -512,7 +512,7 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
     effect(
         "valve_stiction",
         "valve that sticks and slips",
-        "u becomes m = if abs(u - pre(m)) > S then u - j*S*sign(u - pre(m)) else pre(m), perhaps with a lag T",
+        "u becomes m = if abs(u - pre(m)) > S then u - o*sign(u - pre(m)) else pre(m), perhaps with a lag T",
         AN_INPUT,
         ITSELF,
         &[like(

@@ -173,14 +173,13 @@ use Port::{Equation, Input, Parameter, Sensor};
 pub(crate) const CURVE: Term = curve("curve", Equation, Anything, "", &[]);
 
 pub(super) const BACKLASH: Shape = shape("g", Starts::Spread(&[0.02, 0.1, 0.3]), true);
-/// Where a valve lets go, and how far from its signal it stops, as a part of that: its friction is less while it moves
-/// (Q. P. He et al., *Ind. Eng. Chem. Res.* 46, 2007).
+/// Where a valve lets go, and how far from its signal it stops: its friction is less while it moves (Q. P. He et al., *Ind. Eng. Chem. Res.* 46, 2007).
 pub(super) const STICTION: Shape = shape(
     "S",
     Starts::Releases(&[0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0]),
     true,
 );
-pub(super) const STOP: Shape = shape("j", Starts::Share(&[0.001, 0.1, 0.2]), true);
+pub(super) const STOP: Shape = shape("o", Starts::Releases(&[0.03, 0.1]), true);
 pub(super) const HYSTERESIS: Shape = shape("w", Starts::Spread(&[0.1, 0.3, 1.0]), true);
 
 /// A memory that changes at samples only.
@@ -557,11 +556,16 @@ pub(crate) const TERMS: &[Term] = &[
         ],
         &[HYSTERESIS],
     ),
-    // A valve that sticks until its signal is `S` away, and then slips to it.
+    // A valve that sticks until its signal is `S` away, and then slips to it, or until it is `o` away.
+    in_place(
+        "valve_stiction",
+        &[sampled("if abs({z} - {m}) > {S} then {z} else {m}")],
+        &[STICTION],
+    ),
     in_place(
         "valve_stiction",
         &[sampled(
-            "if abs({z} - {m}) > {S} then {z} - {j}*{S}*sign({z} - {m}) else {m}",
+            "if abs({z} - {m}) > {S} then {z} - {o}*sign({z} - {m}) else {m}",
         )],
         &[STICTION, STOP],
     ),

@@ -15,6 +15,7 @@ pub(in crate::explain::engine) fn richer(term: &Term) -> Option<&'static Term> {
         "below" => Some(&BELOW_DAMPED),
         "both_sides" => Some(&BOTH_SIDES_DAMPED),
         "input_backlash" => Some(&BACKLASH_LAGGING),
+        "valve_stiction" if term.shapes.len() == 1 => Some(&SLIP_LAGGING),
         "valve_stiction" => Some(&STICTION_LAGGING),
         "input_hysteresis" => Some(&HYSTERESIS_LAGGING),
         _ => None,
@@ -59,11 +60,16 @@ const BACKLASH_LAGGING: Term = in_place(
     &[LAG, sampled("min(max({p}, {z} - {g}), {z} + {g})")],
     &[BACKLASH, LAG_TIME],
 );
+const SLIP_LAGGING: Term = in_place(
+    "valve_stiction",
+    &[LAG, sampled("if abs({z} - {p}) > {S} then {z} else {p}")],
+    &[STICTION, LAG_TIME],
+);
 const STICTION_LAGGING: Term = in_place(
     "valve_stiction",
     &[
         LAG,
-        sampled("if abs({z} - {p}) > {S} then {z} - {j}*{S}*sign({z} - {p}) else {p}"),
+        sampled("if abs({z} - {p}) > {S} then {z} - {o}*sign({z} - {p}) else {p}"),
     ],
     &[STICTION, STOP, LAG_TIME],
 );
@@ -107,6 +113,6 @@ mod tests {
             assert_eq!(of(richer), of(simple));
             count += 1;
         }
-        assert_eq!(count, 6);
+        assert_eq!(count, 7);
     }
 }
