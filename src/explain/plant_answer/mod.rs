@@ -24,7 +24,7 @@ use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind
 use super::engine::scope::Scope;
 use super::engine::search::Found;
 use super::engine::select::{CHANCE, select};
-use super::engine::terms::library::Port;
+use super::engine::terms::term::Port;
 use super::engine::thresholds::{LEFT, SURE, chance};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,

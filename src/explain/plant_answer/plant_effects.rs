@@ -6,7 +6,7 @@ use super::Answer;
 use crate::explain::engine::fitting::edit::{Place, user_of};
 use crate::explain::engine::fitting::fitted::Fitted;
 use crate::explain::engine::screening::curve::Curve;
-use crate::explain::engine::terms::library::Port;
+use crate::explain::engine::terms::term::Port;
 use crate::explain::engine::terms::values::filled;
 use crate::explain::engine::thresholds::NEEDED;
 use crate::explain::explanation::{Alternative, EffectFound, Evidence, Law, Quantity, Verdict};

@@ -3,7 +3,7 @@
 use crate::explain::engine::fitting::edit::{Edit, NewParameter, Place, acting};
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
-use crate::explain::engine::terms::library::{Port, Starts};
+use crate::explain::engine::terms::term::{Port, Starts};
 use crate::explain::engine::terms::values::filled;
 use crate::physics::estimate::{Fit, PlantRecording};
 use crate::physics::{ModelSpec, Plant};
@@ -218,7 +218,8 @@ mod tests {
     use super::*;
     use crate::explain::engine::fitting::edit::{places, sensors};
     use crate::explain::engine::terms::argument::arguments;
-    use crate::explain::engine::terms::library::{Needs, TERMS};
+    use crate::explain::engine::terms::library::TERMS;
+    use crate::explain::engine::terms::term::Needs;
     use crate::explain::engine::terms::values::grid;
     use crate::physics::parse;
 

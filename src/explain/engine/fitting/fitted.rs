@@ -3,8 +3,8 @@
 use crate::explain::engine::fitting::candidate::Candidate;
 use crate::explain::engine::hypothesis::prefer_asked;
 use crate::explain::engine::screening::screen::Lead;
-use crate::explain::engine::terms::library::Starts;
 use crate::explain::engine::terms::names::{name_rank, named, rank, special_case};
+use crate::explain::engine::terms::term::Starts;
 use crate::physics::ModelSpec;
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 

@@ -9,7 +9,7 @@ use crate::explain::engine::hypothesis::Ground;
 use crate::explain::engine::screening::curve::Curve;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
-use crate::explain::engine::terms::library::{Needs, Port, Starts, Term, curve, shape};
+use crate::explain::engine::terms::term::{Needs, Port, Starts, Term, curve, shape};
 use crate::explain::engine::terms::values::{Instance, evaluate, grid};
 use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::{Fit, Study};
@@ -42,7 +42,7 @@ const FITTED: usize = 3;
 
 const fn law(
     form: &'static str,
-    shapes: &'static [crate::explain::engine::terms::library::Shape],
+    shapes: &'static [crate::explain::engine::terms::term::Shape],
 ) -> Term {
     curve("formula", Port::Equation, Needs::Anything, form, shapes)
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::explain::engine::terms::library::{Shape, Starts, Term};
+use crate::explain::engine::terms::term::{Shape, Starts, Term};
 use crate::explain::engine::thresholds::BETTER;
 use crate::physics::estimate::{Fit, Study};
 

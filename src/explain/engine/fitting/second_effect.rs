@@ -2,8 +2,8 @@
 
 use crate::explain::engine::fitting::fitted::{Fitted, with_more};
 use crate::explain::engine::screening::screen::{Lead, Screen};
-use crate::explain::engine::terms::library::Port;
 use crate::explain::engine::terms::names::{called, family};
+use crate::explain::engine::terms::term::Port;
 use crate::physics::ModelSpec;
 use crate::physics::estimate::{EstimateOptions, Study};
 

@@ -8,7 +8,7 @@ use crate::explain::engine::fitting::candidate::Candidate;
 use crate::explain::engine::fitting::edit::{Edit, Place, literal, sensors};
 use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
 use crate::explain::engine::screening::screen::Lead;
-use crate::explain::engine::terms::library::{Needs, Port, Term};
+use crate::explain::engine::terms::term::{Needs, Port, Term};
 use crate::explain::engine::thresholds::{GLANCE, NEEDED, ROUNDS, SECOND, SURE, THOROUGH};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Plant, VariableKind};

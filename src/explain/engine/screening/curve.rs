@@ -7,7 +7,8 @@ use crate::explain::engine::screening::path::{Hooked, Path};
 use crate::explain::engine::screening::projection::Projection;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::{Argument, ArgumentForm};
-use crate::explain::engine::terms::library::{CURVE, Port};
+use crate::explain::engine::terms::library::CURVE;
+use crate::explain::engine::terms::term::Port;
 
 /// Knots of a curve: half of them at quantiles, half at equal distances.
 const KNOTS: usize = 9;

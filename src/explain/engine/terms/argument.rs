@@ -2,8 +2,8 @@
 
 use crate::physics::{Binary, Equation, ModelSpec, Node, Unknown, VariableId, VariableKind};
 
-use crate::explain::engine::terms::library::Needs;
 use crate::explain::engine::terms::names::{is_velocity, may_be_angle, may_be_velocity};
+use crate::explain::engine::terms::term::Needs;
 
 /// How an argument is made of variables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

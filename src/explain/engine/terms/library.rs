@@ -1,162 +1,8 @@
 //! The effects as data: terms in the language of the plants, what they may enter, and what they are called there.
 
-/// What a term may enter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Port {
-    /// An equation: a function of variables of the plant is added to its right-hand side.
-    Equation,
-    /// An input, as a function of itself.
-    Input,
-    /// A sensor, as a function of what it shows.
-    Sensor,
-    /// A parameter, as a function of variables of the plant.
-    Parameter,
-}
-
-/// What the argument of a term must be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Needs {
-    /// Nothing.
-    Anything,
-    /// Both signs occur.
-    BothSigns,
-    /// Never below zero.
-    Positive,
-    /// A difference of fourth powers of absolute temperatures.
-    Radiation,
-    /// A difference of two variables of one unit.
-    Difference,
-    /// An angle.
-    Angle,
-    /// A velocity of both signs.
-    Velocity,
-    /// The state whose derivative the equation determines.
-    OwnState,
-    /// No argument: a function of time alone.
-    Time,
-}
-
-/// Where the search for a number that shapes a term starts.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Starts {
-    /// Quantiles of the argument.
-    Quantiles(&'static [f64]),
-    /// Quantiles of the size of the argument.
-    SizeQuantiles(&'static [f64]),
-    /// Parts of the argument's standard deviation.
-    Spread(&'static [f64]),
-    /// The same of sizes at which something snaps: what a recording says of them changes in jumps, and the screen looks between
-    /// these for the best.
-    Releases(&'static [f64]),
-    /// Parts of its inverse: wave numbers `2 pi n / range`.
-    Waves(&'static [f64]),
-    /// Parts of the recording's length.
-    Length(&'static [f64]),
-    /// Instants, as parts of the recording's length; the screen looks between them for the sample.
-    Instants(&'static [f64]),
-    /// Parts of the range of the argument's integral.
-    Travel(&'static [f64]),
-    /// Parts of the argument's range in a sample.
-    Rate(&'static [f64]),
-    /// Parts of the root mean square of its rate.
-    RateSize(&'static [f64]),
-    /// Numbers of samples.
-    Samples(&'static [f64]),
-    /// As they stand.
-    Values(&'static [f64]),
-    /// Frequencies at which the spectrum of the residual has its peaks.
-    Peaks,
-    /// Parts of a whole.
-    Share(&'static [f64]),
-    /// What the integral of the argument moves in a sample at a typical size of it.
-    Moved(&'static [f64]),
-}
-
-/// Where a memory starts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum MemoryStart {
-    /// At the first value of the argument.
-    Argument,
-    /// At its square.
-    Square,
-    /// At zero.
-    Zero,
-}
-
-/// A memory of a term: `{m}`, then `{p}` and `{q}`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Memory {
-    /// Its derivative, or, of one that changes at samples only, its value, where it stands for the value before.
-    pub(crate) rate: &'static str,
-    pub(crate) start: MemoryStart,
-    pub(crate) sampled: bool,
-}
-
-/// What stands for the memories in a form.
-pub(crate) const MEMORIES: [&str; 3] = ["{m}", "{p}", "{q}"];
-
-/// A number that shapes a term.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Shape {
-    /// As in the form: `from` for `{from}`. Not the symbol of the strength.
-    pub(crate) symbol: &'static str,
-    pub(crate) starts: Starts,
-    /// True when only positive values make sense.
-    pub(crate) positive: bool,
-}
-
-/// A term.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Term {
-    /// Id where nothing more is known of the place; see [`named`](crate::explain::engine::terms::names::named).
-    pub(crate) id: &'static str,
-    pub(crate) port: Port,
-    pub(crate) needs: Needs,
-    /// Function of `{z}`, of the shapes, and of the memories; the strength is its factor. `{v}` is what stands at the place,
-    /// `{a}` the factor of the derivative there.
-    pub(crate) form: &'static str,
-    pub(crate) memories: &'static [Memory],
-    pub(crate) shapes: &'static [Shape],
-    /// False when the size of the term is fixed by its shapes: `{v}` becomes the form itself.
-    pub(crate) free_strength: bool,
-    /// Symbol of its strength.
-    pub(crate) symbol: &'static str,
-    /// Units of the parameters that it may enter; none: all.
-    pub(crate) units: &'static [&'static str],
-}
-
-pub(in crate::explain::engine) const fn shape(
-    symbol: &'static str,
-    starts: Starts,
-    positive: bool,
-) -> Shape {
-    Shape {
-        symbol,
-        starts,
-        positive,
-    }
-}
-
-pub(in crate::explain::engine) const fn curve(
-    id: &'static str,
-    port: Port,
-    needs: Needs,
-    form: &'static str,
-    shapes: &'static [Shape],
-) -> Term {
-    Term {
-        id,
-        port,
-        needs,
-        form,
-        memories: &[],
-        shapes,
-        free_strength: true,
-        symbol: "c",
-        units: &[],
-    }
-}
-
+use super::term::{
+    Memory, MemoryStart, Needs, Port, Shape, Starts, Term, curve, in_place, sampled, shape,
+};
 pub(super) const ABOVE: &[f64] = &[0.5, 0.7, 0.85, 0.94, 0.98];
 pub(super) const BELOW: &[f64] = &[0.5, 0.3, 0.15, 0.06, 0.02];
 const TIMES: &[f64] = &[
@@ -173,7 +19,8 @@ use Port::{Equation, Input, Parameter, Sensor};
 pub(crate) const CURVE: Term = curve("curve", Equation, Anything, "", &[]);
 
 pub(super) const BACKLASH: Shape = shape("g", Starts::Spread(&[0.02, 0.1, 0.3]), true);
-/// Where a valve lets go, and how far from its signal it stops: its friction is less while it moves (Q. P. He et al., *Ind. Eng. Chem. Res.* 46, 2007).
+/// Where a valve lets go, and how far from its signal it stops: its friction is less while it moves
+/// (Q. P. He et al., *Ind. Eng. Chem. Res.* 46, 2007).
 pub(super) const STICTION: Shape = shape(
     "S",
     Starts::Releases(&[0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0]),
@@ -181,29 +28,6 @@ pub(super) const STICTION: Shape = shape(
 );
 pub(super) const STOP: Shape = shape("o", Starts::Releases(&[0.03, 0.1]), true);
 pub(super) const HYSTERESIS: Shape = shape("w", Starts::Spread(&[0.1, 0.3, 1.0]), true);
-
-/// A memory that changes at samples only.
-pub(super) const fn sampled(value: &'static str) -> Memory {
-    Memory {
-        rate: value,
-        start: MemoryStart::Argument,
-        sampled: true,
-    }
-}
-
-/// What acts in place of an input.
-pub(super) const fn in_place(
-    id: &'static str,
-    memories: &'static [Memory],
-    shapes: &'static [Shape],
-) -> Term {
-    Term {
-        memories,
-        free_strength: false,
-        symbol: "",
-        ..curve(id, Input, Anything, "{m} - {z}", shapes)
-    }
-}
 
 /// Hysteresis of an input with these memories.
 pub(super) const fn hysteresis(memories: &'static [Memory], shapes: &'static [Shape]) -> Term {

@@ -5,4 +5,5 @@ pub(crate) mod documentation;
 pub(crate) mod library;
 pub(crate) mod names;
 pub(crate) mod richer;
+pub(crate) mod term;
 pub(crate) mod values;

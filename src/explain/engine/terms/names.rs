@@ -4,7 +4,7 @@ use crate::physics::{Binary, Equation, ModelSpec, Node, Unknown, VariableId, Var
 
 use crate::explain::engine::fitting::edit::{Place, user_of};
 use crate::explain::engine::fitting::fitted::Fitted;
-use crate::explain::engine::terms::library::{Needs, Port, Term};
+use crate::explain::engine::terms::term::{Needs, Port, Term};
 
 /// What kind of quantity an argument is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,11 +1,9 @@
 //! Forms of terms with one shape more, where their physics has one.
 
-use super::library::Needs::{Anything, BothSigns};
-use super::library::Port::Equation;
-use super::library::{
-    ABOVE, BACKLASH, BELOW, HYSTERESIS, Memory, MemoryStart, STICTION, STOP, Shape, Starts, Term,
-    curve, hysteresis, in_place, sampled, shape,
-};
+use super::library::{ABOVE, BACKLASH, BELOW, HYSTERESIS, STICTION, STOP, hysteresis};
+use super::term::Needs::{Anything, BothSigns};
+use super::term::Port::Equation;
+use super::term::{Memory, MemoryStart, Shape, Starts, Term, curve, in_place, sampled, shape};
 
 /// The form of a term with one shape more: a contact has damping in proportion to its depth (K. H. Hunt and F. R. E. Crossley,
 /// *J. Appl. Mech.* 42, 1975), and an actuator with play, stiction or hysteresis a lag. It keeps the name.

@@ -2,7 +2,7 @@
 
 use crate::explain::engine::fitting::edit::literal;
 use crate::explain::engine::terms::argument::Argument;
-use crate::explain::engine::terms::library::{MEMORIES, Memory, MemoryStart, Starts, Term};
+use crate::explain::engine::terms::term::{MEMORIES, Memory, MemoryStart, Starts, Term};
 use crate::physics::estimate::PlantRecording;
 use crate::physics::{Excitation, Hold, Plant, parse};
 

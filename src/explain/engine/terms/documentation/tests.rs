@@ -5,8 +5,9 @@ use std::collections::BTreeSet;
 use super::*;
 use crate::explain::engine::fitting::edit::{Place, places, sensors};
 use crate::explain::engine::terms::argument::{ArgumentForm, arguments};
-use crate::explain::engine::terms::library::{Needs, Port, TERMS};
+use crate::explain::engine::terms::library::TERMS;
 use crate::explain::engine::terms::names::called;
+use crate::explain::engine::terms::term::{Needs, Port};
 use crate::physics::parse;
 
 /// Plants that between them have every kind of place and argument that a name depends on.
