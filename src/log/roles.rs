@@ -97,10 +97,19 @@ impl TimeUnit {
         })
     }
 
-    /// The unit at the end of a name: `time_ms`, `t_sec`, `epoch_ns`.
+    /// The unit at the end of a name: `time_ms`, `t_sec`, `epoch_ns`; or of a name that is a unit: `Seconds`.
     pub(super) fn of_name(name: &str) -> Option<Self> {
-        let (_, last) = name.rsplit_once(['_', '-', '.'])?;
-        Self::parse(last)
+        match name.rsplit_once(['_', '-', '.']) {
+            Some((_, last)) => Self::parse(last),
+            None => Self::of_word(name),
+        }
+    }
+
+    /// The unit that a word spells out. `min` is more often a minimum, `s` and `d` are letters.
+    fn of_word(word: &str) -> Option<Self> {
+        let word = word.trim().to_lowercase();
+        let spelled = word.ends_with('s') && word.len() > 3 || word == "sec";
+        Self::parse(&word).filter(|_| spelled)
     }
 }
 
@@ -388,8 +397,11 @@ fn default_time(header: &Header, taken: &[usize]) -> Option<usize> {
         .or_else(|| named(&|name| name == "T"))
 }
 
-/// `Time_s`, `timestamp`, `epoch_ms`, `Zeit` and the like.
+/// `Time_s`, `timestamp`, `epoch_ms`, `Zeit`, `Seconds` and the like.
 fn is_usual_time(name: &str) -> bool {
+    if TimeUnit::of_word(name).is_some() {
+        return true;
+    }
     let bare = match TimeUnit::of_name(name) {
         Some(_) => name
             .rsplit_once(['_', '-', '.'])
@@ -404,7 +416,16 @@ fn is_usual_time(name: &str) -> bool {
     (bare != name && (word == "t" || word == "time"))
         || matches!(
             word.as_str(),
-            "timestamp" | "datetime" | "zeit" | "zeitstempel" | "epoch" | "unixtime"
+            "timestamp"
+                | "datetime"
+                | "date"
+                | "zeit"
+                | "zeitstempel"
+                | "epoch"
+                | "unixtime"
+                | "elapsed"
+                | "elapsedtime"
+                | "testtime"
         )
 }
 

@@ -18,7 +18,7 @@ pub(crate) struct RoleFlags {
     /// Output columns, comma-separated [default: headers that start with y]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     outputs: Option<Vec<String>>,
-    /// Time column: numbers, dates or times of day; `none` if there is none [default: t, time, timestamp]
+    /// Time column: numbers, dates or times of day; `none` if there is none [default: t, time, timestamp, seconds; an index without a name]
     #[arg(long, value_name = "NAME")]
     time: Option<String>,
     /// Sample time in seconds; it must agree with the time column, if there is one

@@ -4,6 +4,9 @@ use crate::explain::effects::{Definition, Port, Unit};
 use crate::explain::explanation::{EFFECTS_TIE, EffectFound, Explanation, Quantity, Verdict};
 use crate::log::Channel;
 
+/// The recording that shows what is not linear.
+pub(crate) const OTHER_AMPLITUDES: &str = "repeat the recording at half and at twice the amplitude, and once with a slow ramp over the whole range";
+
 /// Unit of a parameter, as far as the channels' units tell.
 pub(crate) fn unit_text(unit: Unit, input: &Channel, output: &Channel, integral: bool) -> String {
     let of = |channel: &Channel| channel.unit.clone();

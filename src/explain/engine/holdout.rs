@@ -12,6 +12,9 @@ use crate::physics::{Hold, Plant};
 const BLOCKS: usize = 3;
 /// Less of the mean square error in blocks left out is not explained: what is left is then more than what was found.
 pub(crate) const EXPLAINED: f64 = 0.5;
+/// A run that takes this part off the variance of a recording is a very good one (D. N. Moriasi et al., *Trans. ASABE* 50, 2007,
+/// Table 4: Nash-Sutcliffe efficiency above 0.75).
+const VERY_GOOD: f64 = 0.75;
 /// Errors of this many standard deviations and more are those of a run that leaves the recording.
 const STAYS: f64 = 10.0;
 /// Effort of a fit from that to all of the recordings.
@@ -62,6 +65,11 @@ impl HeldOut {
     /// Whether free runs follow the recordings clearly better than their means do.
     pub(crate) fn follows(&self) -> bool {
         ratio(&self.squares, &self.variances) < FOLLOWS && self.stays()
+    }
+
+    /// Whether free runs follow the recordings so closely that what they leave is of little weight.
+    pub(crate) fn follows_closely(&self) -> bool {
+        ratio(&self.squares, &self.variances).powi(2) <= 1.0 - VERY_GOOD && self.stays()
     }
 
     /// Whether free runs stay near the recordings in every output, even if they do not follow them: those of an unstable plant

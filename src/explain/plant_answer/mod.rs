@@ -7,6 +7,7 @@ mod plant_summary;
 mod question;
 mod simulate_explained;
 mod stated_probability;
+mod where_to_look;
 mod within_bounds;
 
 pub use question::{PlantOptions, PlantQuestionError};
@@ -15,6 +16,7 @@ pub use simulate_explained::{AugmentedPlantError, Original};
 use nalgebra::DMatrix;
 
 use self::stated_probability::probability;
+use self::where_to_look::experiment;
 use self::within_bounds::within_bounds;
 
 use super::document::plots::{extremes, spectrum, spectrum_picture};
@@ -180,18 +182,22 @@ impl Answer<'_> {
         let (statistic, tests) = self.found.left();
         let p_value = (tests as f64 * chance(statistic)).min(1.0);
         let adequate = p_value >= CHANCE;
-        let explains = self.found.held_out.as_ref();
-        let explains = explains.is_none_or(|[without, with]| with.removed(without) >= EXPLAINED);
+        let judged = self.found.held_out.as_ref();
+        let close = judged.is_none_or(|[_, with]| with.follows_closely());
+        let explains = judged.is_none_or(|[without, with]| with.removed(without) >= EXPLAINED);
+        // Of a plant that follows worse than the mean most terms take half the error: what is found must follow.
+        let followed = judged.is_none_or(|[without, _]| without.follows());
         let effects: Vec<EffectFound> = self
             .effects()
             .enumerate()
             .filter_map(|(i, fitted)| self.effect(i, fitted))
             .collect();
-        // Where structure is left, a name is given only to what explains more of blocks left out than it leaves. A
-        // curve that leaves structure may follow what enters elsewhere; a term with a name of its own claims more.
+        // Where structure is left, a name is given only to what explains more of blocks left out than it leaves, and leaves
+        // little. A curve that leaves structure may follow what enters elsewhere; a term with a name of its own claims more.
         let curves = effects.iter().any(|e| e.effect == "law");
-        let sure =
-            (gain >= SURE || best.is_some_and(|b| b.proved)) && (adequate || explains && !curves);
+        let sure = (gain >= SURE || best.is_some_and(|b| b.proved))
+            && (followed || close)
+            && (adequate || explains && close && !curves);
         let verdict = if self.found.accepted > 0 && sure {
             Verdict::Named
         } else if self.found.accepted > 0 || p_value < CHANCE {
@@ -257,12 +263,23 @@ impl Answer<'_> {
                     .to_owned(),
             );
         }
+        let alternatives = self.alternatives(verdict);
+        let separating_experiment = (verdict == Verdict::Unexplained).then(|| {
+            let candidates = effects.iter().map(|e| &e.effect);
+            let best = candidates
+                .chain(alternatives.iter().map(|a| &a.effect))
+                .next();
+            experiment(best.map(String::as_str), &alternatives)
+        });
+        if let Some(experiment) = &separating_experiment {
+            summary.push(format!("To settle it: {experiment}."));
+        }
         Explanation {
             format: EXPLANATION_FORMAT.to_owned(),
             verdict,
             probability: probability(verdict, effects.len(), p_value),
             summary,
-            alternatives: self.alternatives(verdict),
+            alternatives,
             hypotheses: self.hypotheses(&recorded, &only, shows),
             location: self.location(verdict, &recorded, &only, shows),
             fit: FitTable {
@@ -290,7 +307,7 @@ impl Answer<'_> {
                     )
                 },
             },
-            separating_experiment: None,
+            separating_experiment,
             effect_size: EffectSize {
                 linear_share: 0.01 * train.parameters_only.fit_percent,
                 removed_share: removed.clamp(0.0, 1.0),

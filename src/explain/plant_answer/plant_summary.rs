@@ -1,6 +1,7 @@
 //! The answer in sentences.
 
 use super::Answer;
+use super::where_to_look::places;
 use crate::explain::document::sentences::{number, quantity};
 use crate::explain::engine::select::CHANCE;
 use crate::explain::explanation::{EffectFound, FitSteps, ParameterChange, Quantity, Verdict};
@@ -32,9 +33,13 @@ impl Answer<'_> {
                     lines.extend(estimates(effect));
                 }
             }
-            Verdict::Unexplained => lines.push(
-                "Something is missing in the equations, and no term of the library describes it surely.".to_owned(),
-            ),
+            Verdict::Unexplained => {
+                lines.push(
+                    "Something is missing in the equations, and no term of the library describes it surely.".to_owned(),
+                );
+                lines.extend(self.found.map.as_ref().and_then(places));
+                lines.extend(effects.iter().map(|e| format!("The closest: {}.", e.sentence)));
+            }
         }
         if !effects.is_empty() && p_value < CHANCE {
             lines.push(

@@ -117,6 +117,15 @@ pub(crate) fn find(name: &str, lines: &[&str], roles: &Roles) -> Option<Layout> 
         Some(_) => raw.iter().map(|field| Channel::parse(field)).collect(),
         None => raw.iter().map(Channel::new).collect(),
     };
+    // A table that was written with its index, which has no name: `df.to_csv(...)`.
+    if let Some(first) = channels.first_mut()
+        && at.is_some()
+        && is_unnamed(&first.name)
+        && holds_times(rows.iter().filter_map(|row| row.first()).copied())
+    {
+        said.push("column 1 has no name and is taken as the time".to_owned());
+        first.name = "time".to_owned();
+    }
     if let Some(row) = units.and_then(|at| lines.get(at)) {
         let row = bare(row);
         for (channel, unit) in channels.iter_mut().zip(cut(&row, separator)) {
@@ -157,6 +166,22 @@ pub(crate) fn cut(line: &str, separator: u8) -> Vec<&str> {
     let mut row = Vec::new();
     fields(line, separator, &mut row);
     row
+}
+
+/// The name of a column without one: none, or pandas' for it.
+fn is_unnamed(name: &str) -> bool {
+    name.is_empty() || name == "Unnamed: 0"
+}
+
+/// Whether cells are dates, or numbers that only grow and are not a count of rows.
+fn holds_times<'a>(cells: impl Iterator<Item = &'a str> + Clone) -> bool {
+    if Format::of(cells.clone()).is_some() {
+        return true;
+    }
+    let numbers: Option<Vec<f64>> = cells.map(|cell| cell.trim().parse().ok()).collect();
+    numbers.is_some_and(|t| {
+        t.windows(2).all(|pair| pair[0] < pair[1]) && t.iter().any(|t| t.fract() != 0.0)
+    })
 }
 
 fn is_value(cell: &str) -> bool {

@@ -4,7 +4,7 @@ use std::io::{Cursor, Write};
 
 use proptest::prelude::*;
 
-use super::{Drip, gzip, long_csv, read, read_as, roles};
+use super::{Drip, fails, gzip, long_csv, read, read_as, roles};
 use crate::log::*;
 
 const PLAIN: &str = "t,u,y\n0,1,2.5\n0.5,-3,4e-1\n1,0.25,+5\n";
@@ -17,6 +17,18 @@ fn same_numbers(csv: &str) {
     assert_eq!(log.input_data, plain.input_data, "{csv:?}");
     assert_eq!(log.output_data, plain.output_data, "{csv:?}");
     assert_eq!(log.sample_time, 0.5, "{csv:?}");
+}
+
+#[test]
+fn a_table_that_was_written_with_its_index() {
+    let dates =
+        "2024-01-01 00:00:00,1,2.5\n2024-01-01 00:00:00.5,-3,4e-1\n2024-01-01 00:00:01,0.25,+5\n";
+    same_numbers(&format!(",u,y\n{dates}"));
+    same_numbers(&format!("Unnamed: 0,u,y\n{dates}"));
+    same_numbers(&PLAIN.replacen('t', "", 1));
+    // A count of rows is no time.
+    let counted = ",u,y\n0,1,2\n1,2,3\n2,3,4\n";
+    fails(read(counted), &["no time column", "(no name)", "--dt"]);
 }
 
 #[test]

@@ -80,6 +80,9 @@ fn units_of_time_are_converted() {
         ("Time [us]", 1e6),
         ("TIME [min]", 1.0 / 60.0),
         ("time [s]", 1.0),
+        ("Seconds", 1.0),
+        ("hours", 1.0 / 3600.0),
+        ("elapsed_ms", 1e3),
     ] {
         let log = stamped(header, (0..100).map(|k| f64::from(k) * 0.25 * scale)).unwrap();
         assert!(

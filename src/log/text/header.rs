@@ -97,7 +97,10 @@ impl Header {
             .channels
             .iter()
             .take(SHOWN)
-            .map(|c| format!("`{}`", brief(&c.to_string())))
+            .map(|c| match c.name.is_empty() {
+                true => "(no name)".to_owned(),
+                false => format!("`{}`", brief(&c.to_string())),
+            })
             .collect();
         if self.channels.len() > SHOWN {
             names.push(format!("... ({} in all)", self.channels.len()));

@@ -3,6 +3,9 @@
 #[cfg(test)]
 mod tests;
 
+/// Other values of the text's own parameters, as an imitation of an effect.
+pub(crate) const PARAMETERS: &str = "parameters";
+
 /// What another effect has in common with one, and how a recording tells the two apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Imitation {
@@ -182,7 +185,7 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
                 "Reach at least three times the usual speed: the exponent shows at large speeds.",
             ),
             like(
-                "parameters",
+                PARAMETERS,
                 "Move at small and at large amplitudes: a linear damper scales with both alike.",
             ),
         ],
@@ -290,7 +293,7 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
         "the variable whose equation it enters, which is never below zero",
         &[
             like(
-                "parameters",
+                PARAMETERS,
                 "Let it empty from full with all inputs off: an outlet of the text scales with its own coefficient.",
             ),
             like(
@@ -322,7 +325,7 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
                 "Cool from at least twice the usual difference to the surroundings.",
             ),
             like(
-                "parameters",
+                PARAMETERS,
                 "Cool from a small and from a large difference: a constant coefficient gives one time constant.",
             ),
         ],
@@ -373,7 +376,7 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
         "any equation or parameter",
         "one variable of the plant, or a product of two",
         &[like(
-            "parameters",
+            PARAMETERS,
             "Visit the whole range of the variable: the shape of the law shows at its ends.",
         )],
     ),

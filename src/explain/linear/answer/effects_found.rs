@@ -380,8 +380,18 @@ impl Answer<'_> {
         let best = self.finding.rivals.first()?;
         match self.finding.verdict {
             Verdict::Family => {
-                let named = self.finding.model.structure.new_effects().first()?.definition;
-                let rival = self.finding.rivals.iter().find(|r| r.definition.id != named.id)?;
+                let named = self
+                    .finding
+                    .model
+                    .structure
+                    .new_effects()
+                    .first()?
+                    .definition;
+                let rival = self
+                    .finding
+                    .rivals
+                    .iter()
+                    .find(|r| r.definition.id != named.id)?;
                 named
                     .mimics
                     .iter()
@@ -395,9 +405,12 @@ impl Answer<'_> {
                         ))
                     })
             }
-            Verdict::Unexplained => best.definition.mimics.first().map(|m| m.experiment.to_owned()).or_else(|| {
-                Some("repeat the recording at half and at twice the amplitude, and once with a slow ramp over the whole range".to_owned())
-            }),
+            Verdict::Unexplained => best
+                .definition
+                .mimics
+                .first()
+                .map(|m| m.experiment.to_owned())
+                .or_else(|| Some(sentences::OTHER_AMPLITUDES.to_owned())),
             _ => None,
         }
     }
