@@ -62,6 +62,15 @@ pub fn explain(
     let recordings = checked.recordings.as_slice();
     let known = know(&checked)?;
     let relative = known.relative;
+    // Equations that reproduce columns make the simulator's own parameters and variables known, which the difference to columns
+    // does not. Data that were repaired are left to the search that knows how.
+    let equations = (relative && checked.troubles.is_empty())
+        .then(|| columns::attempt(&checked, &options.without))
+        .flatten();
+    let equations = match equations {
+        Some((explanation, misfit)) if misfit <= columns::REPRODUCED => return Ok(explanation),
+        equations => equations.map(|(explanation, _)| explanation),
+    };
     let drive = attempt(recordings, &known, &allowed);
     // What a law in the averaged equation of a drive explains to noise needs no other way, and the rest little. Where no law
     // was found, the equation may be blind to what there is (effects of the sensor, another mode), and where a spring
@@ -102,17 +111,11 @@ pub fn explain(
         seed: options.seed,
     }
     .say();
-    // What no linear model reproduces is first explained relative to the simulated columns, which are exact. Only where that
-    // answer is doubtful are equations looked for that reproduce the columns, whose parameters can then be fitted too; data
-    // that were repaired are left to the search that knows how. The answer whose run follows the recording closer is given.
+    // Where equations reproduce the columns roughly, a doubtful answer relative to the columns stands against theirs. The one
+    // whose run follows the recording closer is given.
     if !relative || !is_doubtful(&explanation) {
         return Ok(explanation);
     }
-    let equations = checked
-        .troubles
-        .is_empty()
-        .then(|| columns::attempt(&checked, &options.without))
-        .flatten();
     Ok(match equations {
         Some(equations) if stands_in(&equations, &explanation) => equations,
         Some(equations) if agree(&equations, &explanation) => explanation,

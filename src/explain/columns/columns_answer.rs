@@ -10,8 +10,9 @@ use crate::identify::Recording;
 use crate::log::Log;
 use crate::physics::estimate::PlantRecording;
 
-/// Explains with equations in place of the simulated columns; none where no equations reproduce them.
-pub(crate) fn attempt(checked: &Checked, without: &[String]) -> Option<Explanation> {
+/// Explains with equations in place of the simulated columns, and what these miss of the difference between recording and
+/// simulation; none where no equations reproduce them.
+pub(crate) fn attempt(checked: &Checked, without: &[String]) -> Option<(Explanation, f64)> {
     let Simulation::Outputs(simulated) = &checked.simulation else {
         return None;
     };
@@ -63,7 +64,7 @@ pub(crate) fn attempt(checked: &Checked, without: &[String]) -> Option<Explanati
     if let Some(plant) = &mut explanation.plant {
         plant.simulation = Some(found.plant.spec.text.clone());
     }
-    Some(explanation)
+    Some((explanation, found.misfit))
 }
 
 /// Root mean square of recorded less simulated.

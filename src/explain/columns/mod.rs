@@ -41,7 +41,7 @@ const HOPELESS: f64 = 0.3;
 /// A coefficient is dropped where the outputs change by less than this part of what the recording differs by. With equations that
 /// reproduce the outputs so well no more states are tried.
 const NEGLIGIBLE: f64 = 0.01;
-const REPRODUCED: f64 = 0.005;
+pub(crate) const REPRODUCED: f64 = 0.005;
 const EXACT: f64 = 1e-3;
 /// A fit is continued where that leaves at most this part of the misfit.
 const AGAIN: f64 = 0.7;

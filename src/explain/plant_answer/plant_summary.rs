@@ -2,6 +2,7 @@
 
 use super::Answer;
 use super::where_to_look::places;
+use super::within_bounds::at_bounds;
 use crate::explain::document::sentences::{number, quantity};
 use crate::explain::engine::select::CHANCE;
 use crate::explain::explanation::{EffectFound, FitSteps, ParameterChange, Quantity, Verdict};
@@ -65,6 +66,7 @@ impl Answer<'_> {
                 each.join("; ")
             ));
         }
+        lines.extend(at_bounds(&self.plant.spec, &self.found.fit.point));
         if let (Some(held_out), false) = (held_out, effects.is_empty()) {
             lines.push(format!(
                 "Fitted without a third of the recording, and run freely over it: {:.1} % without it, {:.1} % with it.",

@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use crate::explain::document::sentences::number;
 use crate::physics::ModelSpec;
 
 /// A covariance of numbers that begin with the parameters of a text, given that these are within their bounds: an observation of
@@ -19,10 +20,57 @@ pub(super) fn within_bounds(spec: &ModelSpec, mut covariance: DMatrix<f64>) -> D
     covariance
 }
 
+/// Nearer to a bound than this part of the range between them, or of the bound where there is one, a value is at it.
+const AT_BOUND: f64 = 1e-3;
+
+/// Parameters that stop at a bound of the text, in a sentence: bound or equations are wrong then. `values` begins with those of the
+/// parameters.
+pub(super) fn at_bounds(spec: &ModelSpec, values: &[f64]) -> Option<String> {
+    let parameters = spec.parameters().into_iter().zip(values);
+    let stopped: Vec<String> = parameters
+        .filter_map(|(v, &value)| {
+            let variable = spec.variable(v);
+            let range = variable.max - variable.min;
+            let near = |bound: f64| {
+                let size = if range.is_finite() {
+                    range
+                } else {
+                    bound.abs()
+                };
+                bound.is_finite() && range > 0.0 && (value - bound).abs() <= AT_BOUND * size
+            };
+            let (word, bound) = [("min", variable.min), ("max", variable.max)]
+                .into_iter()
+                .find(|(_, bound)| near(*bound))?;
+            let bound = number(bound);
+            Some(format!("{} ({word} = {bound})", variable.column()))
+        })
+        .collect();
+    (!stopped.is_empty()).then(|| {
+        format!(
+            "At a bound of the text: {}. The bound is wrong, or something else in the equations.",
+            stopped.join(", ")
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::physics::parse;
+
+    #[test]
+    fn parameters_at_a_bound_are_listed() {
+        let text = "model Cart
+               parameter Real m(min=1, max=3) = 2; parameter Real d(min=0) = 1; parameter Real k = 1;
+               input Real u; output Real y; Real v;
+             equation m*der(v) = u - d*v - k; y = v; end Cart;";
+        let spec = parse(text).unwrap();
+        let said = at_bounds(&spec, &[2.9999, 0.0, 5.0]).unwrap();
+        assert!(said.contains("m (max = 3"), "{said}");
+        assert!(said.contains("d (min = 0"), "{said}");
+        assert_eq!(at_bounds(&spec, &[2.0, 0.1, 5.0]), None);
+    }
 
     #[test]
     fn bounds_are_observations_of_the_parameters() {

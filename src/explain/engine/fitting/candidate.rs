@@ -27,7 +27,7 @@ pub(crate) struct Candidate {
     /// Values that they start from.
     pub(crate) values: Vec<f64>,
     pub(crate) new_states: usize,
-    /// What stands at the place now.
+    /// What stands at the place now, and the equations of the memories in it.
     pub(crate) equation: String,
 }
 
@@ -168,8 +168,14 @@ pub(crate) fn candidate(
         changed.variables[state.index()].uncorrected = true;
     }
     let names = edit.parameters.iter().map(|p| p.name.clone()).collect();
+    let equation = equation_text(&changed, spec, lead.place);
+    let own = edit
+        .equations
+        .iter()
+        .map(|e| e.trim().trim_end_matches(';'));
+    let equations: Vec<&str> = [equation.as_str()].into_iter().chain(own).collect();
     Some(Candidate {
-        equation: equation_text(&changed, spec, lead.place),
+        equation: equations.join("; "),
         plant: Plant::new(changed),
         names,
         values,
