@@ -41,7 +41,7 @@ const MOSTLY_FREE: f64 = 0.5;
 /// A mode with more damping has no peak (the response of second order has one below 1/sqrt(2)): it is no resonance.
 const RESONANT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Fewer periods in a recording are a trend and no periodic disturbance.
+/// Fewer periods in a recording are a trend and no periodic disturbance, and fewer in a travel are a curve and no cogging.
 const FEWEST_PERIODS: f64 = 2.0;
 
 /// A typical speed of the signal that effect `index` looks at.
@@ -189,6 +189,7 @@ pub(crate) fn sane(problem: &Problem, fit: &Fit) -> bool {
                 ("frequency", _) if effect.definition.id == "periodic_disturbance" => {
                     v * length > FEWEST_PERIODS
                 }
+                ("pitch", _) => range(problem, fit, index) > FEWEST_PERIODS * v,
                 ("damping", _) if effect.definition.id == "extra_mode" => *v < RESONANT,
                 ("presliding_distance", _) => *v < 0.5 * travel(problem, fit, index),
                 ("yield_distance", _) => *v > RESOLVED_LOOP * travel(problem, fit, index),
@@ -284,13 +285,24 @@ fn integrated(problem: &Problem, fit: &Fit, o: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Half the range of the position that effect `index` looks at, as far as outputs tell.
-pub(crate) fn travel(problem: &Problem, fit: &Fit, index: usize) -> f64 {
+/// The position that effect `index` looks at, as far as outputs tell.
+fn position(problem: &Problem, fit: &Fit, index: usize) -> Vec<f64> {
     let all = |o: usize| simulated(problem, fit, o).flatten().copied();
-    let position: Vec<f64> = match fit.structure.effects[index].signal {
+    match fit.structure.effects[index].signal {
         Signal::Output(o) => all(o).collect(),
         Signal::Difference(i, j) => all(i).zip(all(j)).map(|(a, b)| a - b).collect(),
         Signal::Integral(o) => integrated(problem, fit, o),
-    };
-    effects::level(&position, 0.95, f64::abs)
+    }
+}
+
+/// Half its range.
+pub(crate) fn travel(problem: &Problem, fit: &Fit, index: usize) -> f64 {
+    effects::level(&position(problem, fit, index), 0.95, f64::abs)
+}
+
+/// From its least to its largest value, wherever these are.
+fn range(problem: &Problem, fit: &Fit, index: usize) -> f64 {
+    let position = position(problem, fit, index);
+    let end = |of: fn(f64, f64) -> f64| position.iter().copied().reduce(of).unwrap_or(0.0);
+    end(f64::max) - end(f64::min)
 }

@@ -96,6 +96,11 @@ fn changes_and_waves_take_place_in_the_recording() {
             "{periods}"
         );
     }
+    let range = motion(1.0) - motion(0.0);
+    for (periods, sane) in [(1.9, false), (2.1, true)] {
+        let theta = [1e-9, f64::ln(range / periods), 0.0];
+        assert_eq!(is_sane(effect("cogging", ""), &theta), sane, "{periods}");
+    }
     for (damping, sane) in [(0.05, true), (0.7, true), (0.72, false)] {
         let theta = [0.0, f64::ln(damping), 0.1, 0.1];
         assert_eq!(is_sane(effect("extra_mode", ""), &theta), sane, "{damping}");
