@@ -1,6 +1,8 @@
 //! What a missing term may be a function of, with its values along the recordings.
 
-use crate::physics::{Binary, Equation, ModelSpec, Node, Unknown, VariableId, VariableKind};
+use crate::physics::{
+    Binary, Equation, ExpressionId, ModelSpec, Node, Unknown, VariableId, VariableKind,
+};
 
 use crate::explain::engine::terms::names::{is_velocity, may_be_angle, may_be_velocity};
 use crate::explain::engine::terms::term::Needs;
@@ -210,6 +212,33 @@ fn difference_of(spec: &ModelSpec, a: VariableId, b: VariableId) -> Option<Varia
     (spec.variable(variable).kind == VariableKind::Algebraic).then_some(variable)
 }
 
+/// The one variable that an expression is an affine function of, with coefficients made of parameters and numbers; `Some(None)`
+/// where it is made of these alone, none where it is anything else.
+fn affine(spec: &ModelSpec, id: ExpressionId) -> Option<Option<VariableId>> {
+    let of = |id| affine(spec, id);
+    match spec.expressions.node(id) {
+        Node::Number(_) => Some(None),
+        Node::Variable(v) => match spec.variable(v).kind {
+            VariableKind::Parameter | VariableKind::Constant => Some(None),
+            _ => Some(Some(v)),
+        },
+        Node::Negate(a) => of(a),
+        Node::Binary(Binary::Add | Binary::Subtract, a, b) => match (of(a)?, of(b)?) {
+            (Some(a), Some(b)) if a != b => None,
+            (a, b) => Some(a.or(b)),
+        },
+        Node::Binary(Binary::Multiply, a, b) => match (of(a)?, of(b)?) {
+            (Some(_), Some(_)) => None,
+            (a, b) => Some(a.or(b)),
+        },
+        Node::Binary(Binary::Divide, a, b) => match of(b)? {
+            Some(_) => None,
+            None => of(a),
+        },
+        _ => None,
+    }
+}
+
 /// Variables of the plant that something may depend on, differences of two of one unit, and products of states and inputs.
 pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
     let name = |v: VariableId| spec.variable(v).name.clone();
@@ -221,13 +250,13 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
     .into_iter()
     .flat_map(|kind| spec.of_kind(kind).collect::<Vec<_>>())
     .collect();
-    // What only copies another variable is that variable.
+    // What only copies a variable, or is a scale of it, is that variable: a function of one is a function of the other.
     let copies = |v: VariableId| {
         spec.equations.iter().any(|e| {
             e.unknown.variable() == v
                 && spec.variable(v).kind == VariableKind::Algebraic
                 && e.coefficient.is_none()
-                && matches!(spec.expressions.node(e.rest), Node::Variable(_))
+                && matches!(affine(spec, e.rest), Some(Some(_)))
         })
     };
     let simple: Vec<VariableId> = simple.into_iter().filter(|&v| !copies(v)).collect();
@@ -284,4 +313,26 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
         argument
     }));
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::parse;
+
+    #[test]
+    fn a_scale_of_a_variable_is_no_argument_of_its_own() {
+        let spec = parse(
+            "model Cell parameter Real E0 = 3; parameter Real E1 = 1; parameter Real R = 0.1;
+             input Real i; output Real v; Real soc; Real ocv; Real loss; Real inner;
+             equation
+               der(soc) = i/3600; ocv = E0 + E1*soc/2; loss = R*i^2; inner = ocv - R*i; v = inner - loss;
+             end Cell;",
+        )
+        .unwrap();
+        let known = arguments(&spec);
+        let has = |name: &str| known.iter().any(|a| a.expression == name);
+        assert!(has("soc") && has("i") && has("loss") && has("inner"));
+        assert!(!has("ocv"));
+    }
 }
