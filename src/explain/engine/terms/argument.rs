@@ -324,15 +324,19 @@ mod tests {
     fn a_scale_of_a_variable_is_no_argument_of_its_own() {
         let spec = parse(
             "model Cell parameter Real E0 = 3; parameter Real E1 = 1; parameter Real R = 0.1;
-             input Real i; output Real v; Real soc; Real ocv; Real loss; Real inner;
+             input Real i; output Real v; Real soc; Real ocv; Real loss; Real rest;
              equation
-               der(soc) = i/3600; ocv = E0 + E1*soc/2; loss = R*i^2; inner = ocv - R*i; v = inner - loss;
+               der(soc) = i/3600; ocv = E0 + E1*soc/2; loss = R*i^2; rest = ocv - R*i; v = rest - loss;
              end Cell;",
         )
         .unwrap();
         let known = arguments(&spec);
         let has = |name: &str| known.iter().any(|a| a.expression == name);
-        assert!(has("soc") && has("i") && has("loss") && has("inner"));
+        let names: Vec<&String> = known.iter().map(|a| &a.expression).collect();
+        assert!(
+            has("soc") && has("i") && has("loss") && has("rest"),
+            "{names:?}"
+        );
         assert!(!has("ocv"));
     }
 }
