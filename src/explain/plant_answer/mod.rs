@@ -193,11 +193,12 @@ impl Answer<'_> {
             .filter_map(|(i, fitted)| self.effect(i, fitted))
             .collect();
         // Where structure is left, a name is given only to what explains more of blocks left out than it leaves, and leaves
-        // little. A curve that leaves structure may follow what enters elsewhere; a term with a name of its own claims more.
+        // little; a plant that does not run freely has no such blocks. A curve that leaves structure may follow what enters
+        // elsewhere; a term with a name of its own claims more.
         let curves = effects.iter().any(|e| e.effect == "law");
         let sure = (gain >= SURE || best.is_some_and(|b| b.proved))
             && (followed || close)
-            && (adequate || explains && close && !curves);
+            && (adequate || judged.is_some() && explains && close && !curves);
         let verdict = if self.found.accepted > 0 && sure {
             Verdict::Named
         } else if self.found.accepted > 0 || p_value < CHANCE {
