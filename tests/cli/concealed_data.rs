@@ -189,6 +189,10 @@ fn figures_agree(case: &str, said: &Explanation) {
         (0.0..=1.0).contains(&remaining.p_value),
         "{case}: {remaining:?}"
     );
+    // Equations have score tests of their own, with another level.
+    if said.plant.is_some() {
+        return;
+    }
     let quiet = remaining.sentence.starts_with("Nothing is left that");
     assert!(!quiet || remaining.adequate, "{case}: {remaining:?}");
     assert!(

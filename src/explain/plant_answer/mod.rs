@@ -250,12 +250,17 @@ impl Answer<'_> {
         let train = steps(shows);
         let removed = 1.0
             - (train.augmented.rmse / train.parameters_only.rmse.max(f64::MIN_POSITIVE)).powi(2);
+        let left = 1.0 - 0.01 * train.parameters_only.fit_percent;
+        let held_out = self.held_out(shows, &train);
+        let heldout_gain = held_out
+            .as_ref()
+            .map_or(0.0, |h| h.parameters_only.rmse - h.augmented.rmse);
         let mut summary = self.summary(
             verdict,
             &effects,
             &parameters,
             &outputs[shows],
-            (&train, self.held_out(shows, &train).as_ref()),
+            (&train, held_out.as_ref()),
             p_value,
         );
         if !runs {
@@ -286,7 +291,7 @@ impl Answer<'_> {
             fit: FitTable {
                 output: outputs[shows].clone(),
                 train: train.clone(),
-                heldout: self.held_out(shows, &train),
+                heldout: held_out,
                 heldout_blocks: match self.found.held_out {
                     Some(_) => self.recordings.first().map_or_else(Vec::new, blocks),
                     None => vec![],
@@ -310,9 +315,9 @@ impl Answer<'_> {
             },
             separating_experiment,
             effect_size: EffectSize {
-                linear_share: 0.01 * train.parameters_only.fit_percent,
+                linear_share: (1.0 - left * left).clamp(0.0, 1.0),
                 removed_share: removed.clamp(0.0, 1.0),
-                heldout_gain: 0.0,
+                heldout_gain,
             },
             detectable: vec![],
             noise: self.noise(),
