@@ -65,12 +65,17 @@ pub fn explain(
     // Equations that reproduce columns make the simulator's own parameters and variables known, which the difference to columns
     // does not. Data that were repaired are left to the search that knows how.
     let equations = (relative && checked.troubles.is_empty())
-        .then(|| columns::attempt(&checked, &options.without))
+        .then(|| columns::equations(&checked))
         .flatten();
-    let equations = match equations {
-        Some((explanation, misfit)) if misfit <= columns::REPRODUCED => return Ok(explanation),
-        equations => equations.map(|(explanation, _)| explanation),
-    };
+    let by_equations =
+        || columns::explain_equations(equations.as_ref()?, &checked, &options.without);
+    if equations
+        .as_ref()
+        .is_some_and(|e| e.misfit <= columns::REPRODUCED)
+        && let Some(explanation) = by_equations()
+    {
+        return Ok(explanation);
+    }
     let drive = attempt(recordings, &known, &allowed);
     // What a law in the averaged equation of a drive explains to noise needs no other way, and the rest little. Where no law
     // was found, the equation may be blind to what there is (effects of the sensor, another mode), and where a spring
@@ -116,7 +121,7 @@ pub fn explain(
     if !relative || !is_doubtful(&explanation) {
         return Ok(explanation);
     }
-    Ok(match equations {
+    Ok(match by_equations() {
         Some(equations) if stands_in(&equations, &explanation) => equations,
         Some(equations) if agree(&equations, &explanation) => explanation,
         _ => {

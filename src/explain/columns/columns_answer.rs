@@ -1,6 +1,6 @@
 //! The answer where a simulation is known by its outputs, and equations reproduce them.
 
-use super::{Question, USEFUL, reproduce};
+use super::{Question, Reproduced, USEFUL, reproduce};
 use crate::explain::engine::terms::documentation::plant_effect;
 use crate::explain::explanation::Explanation;
 use crate::explain::linear::check::Checked;
@@ -10,9 +10,8 @@ use crate::identify::Recording;
 use crate::log::Log;
 use crate::physics::estimate::PlantRecording;
 
-/// Explains with equations in place of the simulated columns, and what these miss of the difference between recording and
-/// simulation; none where no equations reproduce them.
-pub(crate) fn attempt(checked: &Checked, without: &[String]) -> Option<(Explanation, f64)> {
+/// Equations in place of the simulated columns; none where no equations reproduce them.
+pub(crate) fn equations(checked: &Checked) -> Option<Reproduced> {
     let Simulation::Outputs(simulated) = &checked.simulation else {
         return None;
     };
@@ -32,8 +31,16 @@ pub(crate) fn attempt(checked: &Checked, without: &[String]) -> Option<(Explanat
         outputs: &first.outputs,
         difference: &difference,
     };
-    let found = reproduce(&columns, &question).filter(|f| f.misfit <= USEFUL)?;
-    let outputs = first.outputs.len();
+    reproduce(&columns, &question).filter(|f| f.misfit <= USEFUL)
+}
+
+/// Explains with equations in place of the simulated columns.
+pub(crate) fn explain_equations(
+    found: &Reproduced,
+    checked: &Checked,
+    without: &[String],
+) -> Option<Explanation> {
+    let outputs = checked.recordings.first()?.outputs.len();
     let mut logs = checked.recordings.clone();
     for (r, log) in logs.iter_mut().enumerate() {
         for (j, y) in log.output_data.iter_mut().enumerate() {
@@ -64,7 +71,7 @@ pub(crate) fn attempt(checked: &Checked, without: &[String]) -> Option<(Explanat
     if let Some(plant) = &mut explanation.plant {
         plant.simulation = Some(found.plant.spec.text.clone());
     }
-    Some((explanation, found.misfit))
+    Some(explanation)
 }
 
 /// Root mean square of recorded less simulated.

@@ -13,7 +13,7 @@ mod drop_coefficients;
 mod filtered_signals;
 mod regression;
 
-pub(crate) use columns_answer::attempt;
+pub(crate) use columns_answer::{equations, explain_equations};
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;

@@ -182,23 +182,27 @@ impl Answer<'_> {
         let (statistic, tests) = self.found.left();
         let p_value = (tests as f64 * chance(statistic)).min(1.0);
         let adequate = p_value >= CHANCE;
-        let judged = self.found.held_out.as_ref();
-        let close = judged.is_none_or(|[_, with]| with.follows_closely());
-        let explains = judged.is_none_or(|[without, with]| with.removed(without) >= EXPLAINED);
-        // Of a plant that follows worse than the mean most terms take half the error: what is found must follow.
-        let followed = judged.is_none_or(|[without, _]| without.follows());
+        // Of a plant that follows worse than the mean most terms take half the error: what is found must follow. A plant that
+        // does not run freely has no blocks that say so.
+        let (follows, explains) = match &self.found.held_out {
+            None => (true, false),
+            Some([without, with]) => {
+                let closely = with.follows_closely();
+                let removes = with.removed(without) >= EXPLAINED;
+                (without.follows() || closely, removes && closely)
+            }
+        };
         let effects: Vec<EffectFound> = self
             .effects()
             .enumerate()
             .filter_map(|(i, fitted)| self.effect(i, fitted))
             .collect();
         // Where structure is left, a name is given only to what explains more of blocks left out than it leaves, and leaves
-        // little; a plant that does not run freely has no such blocks. A curve that leaves structure may follow what enters
-        // elsewhere; a term with a name of its own claims more.
+        // little. A curve that leaves structure may follow what enters elsewhere; a term with a name of its own claims more.
         let curves = effects.iter().any(|e| e.effect == "law");
         let sure = (gain >= SURE || best.is_some_and(|b| b.proved))
-            && (followed || close)
-            && (adequate || judged.is_some() && explains && close && !curves);
+            && follows
+            && (adequate || explains && !curves);
         let verdict = if self.found.accepted > 0 && sure {
             Verdict::Named
         } else if self.found.accepted > 0 || p_value < CHANCE {

@@ -130,9 +130,8 @@ fn answer(change: &dyn Fn(&mut Point)) -> Explanation {
     for y in &mut recorded[0] {
         *y += 0.003 * random.sample::<f64, _>(StandardNormal);
     }
-    attempt(&Checked::new(&[log(recorded)], &known, &|_| true), &[])
-        .unwrap()
-        .0
+    let checked = Checked::new(&[log(recorded)], &known, &|_| true);
+    explain_equations(&equations(&checked).unwrap(), &checked, &[]).unwrap()
 }
 
 /// Of a pendulum with a drag that the simulation leaves out.

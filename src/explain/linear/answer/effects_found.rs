@@ -409,7 +409,12 @@ impl Answer<'_> {
                 .definition
                 .mimics
                 .first()
-                .map(|m| m.experiment.to_owned())
+                .map(|m| {
+                    // Nothing is named: the sentence says which candidates it is about.
+                    let spoken = |id: &str| id.replace('_', " ");
+                    let (one, other) = (spoken(best.definition.id), spoken(m.effect));
+                    format!("{} (tells {one} from {other})", m.experiment)
+                })
                 .or_else(|| Some(sentences::OTHER_AMPLITUDES.to_owned())),
             _ => None,
         }
