@@ -6,6 +6,8 @@
 pub(crate) mod fitting;
 pub(crate) mod holdout;
 pub(crate) mod hypothesis;
+pub(crate) mod long_recordings;
+mod named_alone;
 pub(crate) mod scope;
 pub(crate) mod screening;
 pub(crate) mod search;

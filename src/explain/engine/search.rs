@@ -7,6 +7,7 @@ use super::fitting::fitted::{Fitted, TIE, with_more};
 use super::fitting::second_effect::{determined, differs};
 use super::holdout::{EXPLAINED, Estimator, HeldOut, held_out};
 use super::hypothesis::Trial;
+use super::long_recordings::Searched;
 use super::scope::Scope;
 use super::step::{Stage, Step, improved, step};
 use super::terms::names::named;
@@ -17,6 +18,7 @@ use crate::physics::estimate::{EstimateError, EstimateOptions, Fit, Form, PlantR
 use crate::physics::{Hold, Plant};
 
 /// What the search has found.
+#[derive(Clone)]
 pub(crate) struct Found {
     pub(crate) given: Plant,
     pub(crate) baseline: Fit,
@@ -37,6 +39,9 @@ pub(crate) struct Found {
     pub(crate) map: Option<EquationMap>,
     /// Free runs in blocks that the fit had not seen, without and with the effects; none where the plant does not run freely.
     pub(crate) held_out: Option<[HeldOut; 2]>,
+    /// Values that were searched, and what part of long recordings they are.
+    pub(crate) values: usize,
+    pub(crate) part: Option<Searched>,
 }
 
 /// What fits are compared by.
@@ -176,6 +181,7 @@ pub(crate) fn search(
         least_squares,
     };
     let study = Study::new(plant, recordings, &options)?;
+    let values = study.count();
     let mut baseline = match known {
         Some(fit) => fit.clone(),
         None => study.fit(least_squares.then_some(Form::FreeRun))?,
@@ -326,6 +332,8 @@ pub(crate) fn search(
         options,
         information: 1.0,
         held_out: None,
+        values,
+        part: None,
         map: first_map,
     })
 }

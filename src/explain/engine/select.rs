@@ -10,6 +10,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::explain::engine::holdout::{
     EXPLAINED, Estimator, HeldOut, all_free, as_given, free_run_error, held_out,
 };
+use crate::explain::engine::long_recordings::part;
+use crate::explain::engine::named_alone::named_alone;
 use crate::explain::engine::scope::Scope;
 use crate::explain::engine::search::{Found, Objective, search};
 use crate::explain::engine::terms::names::named;
@@ -39,11 +41,33 @@ struct Rival {
     misspecified: bool,
 }
 
-/// What the equations leave out.
+/// What the equations leave out. Of long recordings a part is searched; what it shows is fitted to all samples and judged by them.
 ///
 /// # Errors
 /// As those of an estimation.
 pub(crate) fn select(
+    plant: &Plant,
+    recordings: &[PlantRecording],
+    hold: Hold,
+    scope: &Scope,
+) -> Result<Found, EstimateError> {
+    let Some(part) = part(plant, recordings, hold) else {
+        return decide(plant, recordings, hold, scope);
+    };
+    let found = decide(plant, &part.recordings, hold, scope)?;
+    let Some(mut found) = found.on_all(recordings, &part) else {
+        return decide(plant, recordings, hold, scope);
+    };
+    let rivals = rivals(&found, 0, recordings, hold);
+    if worsens(&rivals, 0, found.accepted) {
+        found.keep(0);
+    }
+    let judged = rivals.iter().any(|r| r.held_out.follows());
+    settle(&mut found, &rivals, 0, judged, recordings);
+    Ok(found)
+}
+
+fn decide(
     plant: &Plant,
     recordings: &[PlantRecording],
     hold: Hold,
@@ -113,25 +137,36 @@ pub(crate) fn select(
         };
     }
     let (which, accepted) = chosen;
-    let fitted = |accepted: usize| {
-        let own = |r: &&Rival| r.accepted == accepted && (accepted == 0 || r.search == which);
-        trusted(&rivals.iter().filter(own).collect::<Vec<_>>(), judged)
-    };
-    let (baseline, last) = (fitted(0), fitted(accepted));
     let mut found = searches.swap_remove(which);
     found.keep(accepted);
+    settle(&mut found, &rivals, which, judged, recordings);
+    Ok(named_alone(&found, recordings, hold).unwrap_or(found))
+}
+
+/// Takes the fits that are to be trusted, without the effects and with them.
+fn settle(
+    found: &mut Found,
+    rivals: &[Rival],
+    search: usize,
+    judged: bool,
+    recordings: &[PlantRecording],
+) {
+    let fitted = |accepted: usize| {
+        let own = |r: &&Rival| r.accepted == accepted && (accepted == 0 || r.search == search);
+        trusted(&rivals.iter().filter(own).collect::<Vec<_>>(), judged)
+    };
+    let (baseline, last) = (fitted(0), fitted(found.accepted));
     if let Some(without) = baseline {
         found.baseline = without.fit.clone();
     }
     if let Some(with) = last {
         found.options.least_squares = with.estimator != Estimator::Likelihood;
         found.fit = with.fit.clone();
-        found.information = information(&found, recordings).unwrap_or(1.0);
+        found.information = information(found, recordings).unwrap_or(1.0);
         if judged && let Some(without) = baseline {
             found.held_out = Some([without.held_out.clone(), with.held_out.clone()]);
         }
     }
-    Ok(found)
 }
 
 /// Whether a free run with fewer effects, but some, of another search follows all of the data as closely.

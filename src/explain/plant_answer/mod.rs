@@ -305,7 +305,7 @@ impl Answer<'_> {
             remaining: Remaining {
                 adequate: p_value >= LEFT,
                 p_value,
-                share: statistic / self.base.count().max(1) as f64,
+                share: statistic / self.found.values.max(1) as f64,
                 share_of_removed: None,
                 features: tests,
                 sentence: if p_value >= LEFT {
@@ -313,7 +313,7 @@ impl Answer<'_> {
                 } else {
                     format!(
                         "The strongest of {tests} score tests still takes {:.1} % off what is left.",
-                        100.0 * statistic / self.base.count().max(1) as f64
+                        100.0 * statistic / self.found.values.max(1) as f64
                     )
                 },
             },

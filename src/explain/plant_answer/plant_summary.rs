@@ -6,6 +6,7 @@ use super::within_bounds::at_bounds;
 use crate::explain::document::sentences::{number, quantity};
 use crate::explain::engine::select::CHANCE;
 use crate::explain::explanation::{EffectFound, FitSteps, ParameterChange, Quantity, Verdict};
+use crate::physics::estimate::PlantRecording;
 
 /// Parameters of an effect that the summary lists.
 const MOST_ESTIMATES: usize = 6;
@@ -83,6 +84,17 @@ impl Answer<'_> {
                 format!(", {:.1} % with what was found", train.augmented.fit_percent)
             }
         ));
+        lines.extend(self.found.part.map(|part| {
+            let all: usize = self.recordings.iter().map(PlantRecording::samples).sum();
+            let which = match part.every {
+                1 => "in one stretch of each recording".to_owned(),
+                every => format!("one in {every}"),
+            };
+            format!(
+                "Effects were searched for in {} of {all} samples, {which}; parameters, free runs and blocks left out are of all.",
+                part.samples
+            )
+        }));
         lines
     }
 }

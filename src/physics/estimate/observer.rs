@@ -122,6 +122,10 @@ pub(super) fn integrates(problem: &Problem) -> bool {
             return;
         };
         let length = excitation.sample_time * excitation.length as f64;
+        // A static plant has no poles, and the decomposition none to find.
+        if linear.a.is_empty() {
+            return;
+        }
         let poles = linear.a.complex_eigenvalues();
         slow |= poles.iter().any(|p| p.re * length > -1.0);
     });

@@ -115,7 +115,7 @@ impl PlantRecording {
         }
     }
 
-    fn samples(&self) -> usize {
+    pub(crate) fn samples(&self) -> usize {
         self.outputs.first().map_or(0, Vec::len)
     }
 }

@@ -76,6 +76,11 @@ impl<'a> Study<'a> {
         self.information * fit.deviance + penalty(numbers, values, self.count())
     }
 
+    /// What a number more adds to the criterion, about.
+    pub(crate) fn cost_of_a_number(&self) -> f64 {
+        (self.information * self.count() as f64).max(1.0).ln()
+    }
+
     /// The free numbers as the text has them.
     pub(crate) fn nominal(&self) -> Vec<f64> {
         self.problem.nominal()

@@ -1,14 +1,13 @@
 //! More knots for a curve where the recording asks for them.
 
-use rayon::prelude::*;
-
 use crate::explain::engine::fitting::candidate::{Candidate, candidate};
 use crate::explain::engine::fitting::fitted::{Fitted, TIE, searched, with_more};
 use crate::explain::engine::hypothesis::Ground;
 use crate::explain::engine::screening::curve::Curve;
+use crate::explain::engine::screening::projection::Projection;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
-use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH};
+use crate::explain::engine::thresholds::{GLANCED_ACCURACY, MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::Fit;
 
 /// Rounds in which knots are added.
@@ -75,18 +74,36 @@ fn refined(
         let start = made.from(&now.without_term(first), first);
         Some((lead, made, start))
     };
-    let useful: Vec<(f64, f64)> = middles
-        .into_par_iter()
-        .filter_map(|middle| {
-            let (_, made, start) = with(&[middle])?;
-            let options = with_more(ground.options, made.values.len());
-            let inner = ground.study.of(&made.plant, &options).ok()?;
-            let fit = inner.glance(&start, GLANCE)?;
-            let gain = now.fit.criterion - fit.criterion;
-            (gain > TIE.0).then_some((gain, middle))
-        })
-        .collect();
-    let mut useful = useful;
+    let rough = |made: &Candidate| {
+        let options = with_more(ground.options, made.values.len());
+        let plant = made
+            .plant
+            .clone()
+            .with_accuracy(GLANCED_ACCURACY)
+            .with_most_steps(MOST_STEPS);
+        (plant, options)
+    };
+    // A score test of every new knot, beside the curve as it is: with all of them in it, it is the same function.
+    let projection = {
+        let (plant, options) = rough(&now.candidate);
+        Projection::new(&ground.study.of(&plant, &options).ok()?, &now.fit)?
+    };
+    let (lead, made, start) = with(&middles)?;
+    let (plant, options) = rough(&made);
+    let wide = ground.study.of(&plant, &options).ok()?;
+    let derivatives = wide.derivatives(&start)?;
+    let inside = wide.inside(&start);
+    let knots = &lead.curve.as_ref()?.knots;
+    let gain = |middle: f64| -> Option<f64> {
+        let number = first + knots.iter().position(|&k| k == middle)?;
+        let column = inside.iter().position(|&i| i == number)?;
+        let column = derivatives.column(column).iter().copied().collect();
+        Some(
+            wide.information() * projection.test(column, true)?.statistic - wide.cost_of_a_number(),
+        )
+    };
+    let tested = middles.iter().map(|&m| (gain(m).unwrap_or(0.0), m));
+    let mut useful: Vec<(f64, f64)> = tested.filter(|(gain, _)| *gain > TIE.0).collect();
     useful.sort_by(|a, b| b.0.total_cmp(&a.0));
     useful.truncate(MOST_KNOTS.saturating_sub(curve.knots.len()));
     if useful.is_empty() {
@@ -94,10 +111,12 @@ fn refined(
     }
     let new: Vec<f64> = useful.into_iter().map(|(_, middle)| middle).collect();
     let (lead, made, start) = with(&new)?;
-    let options = with_more(ground.options, made.values.len());
-    let limited = made.plant.clone().with_most_steps(MOST_STEPS);
-    let inner = ground.study.of(&limited, &options).ok()?;
-    let fit = inner.refit(&start, ROUNDS, THOROUGH)?;
+    let (plant, options) = rough(&made);
+    let fit = ground
+        .study
+        .of(&plant, &options)
+        .ok()?
+        .refit(&start, ROUNDS, THOROUGH)?;
     let gain = ground.fit.criterion - fit.criterion - searched(&lead, ground.recordings);
     (gain > now.gain + TIE.0).then(|| Fitted {
         gain,

@@ -43,15 +43,20 @@ impl Projection {
             }
             norms.push(if norm > 0.0 { norm } else { f64::INFINITY });
         }
-        let parts = q.svd(true, true);
-        let (u, v) = (parts.u?, parts.v_t?);
-        let kept: Vec<usize> = (0..u.ncols())
-            .filter(|&i| parts.singular_values[i] > 1e-7)
-            .collect();
-        let q = u.select_columns(&kept);
-        let numbers = DMatrix::from_fn(norms.len(), kept.len(), |i, j| {
-            v[(kept[j], i)] / parts.singular_values[kept[j]] / norms[i]
-        });
+        // Nothing is fitted of a static plant without parameters: there is nothing to project off.
+        let (q, numbers) = if q.is_empty() {
+            (q, DMatrix::zeros(0, 0))
+        } else {
+            let parts = q.svd(true, true);
+            let (u, v) = (parts.u?, parts.v_t?);
+            let kept: Vec<usize> = (0..u.ncols())
+                .filter(|&i| parts.singular_values[i] > 1e-7)
+                .collect();
+            let numbers = DMatrix::from_fn(norms.len(), kept.len(), |i, j| {
+                v[(kept[j], i)] / parts.singular_values[kept[j]] / norms[i]
+            });
+            (u.select_columns(&kept), numbers)
+        };
         let e = fit.noise.whiten_kept(&study.residual(fit)?, study.mask());
         let mut residual: Vec<f64> = e.iter().map(|&e| fit.noise.weight(e) * e).collect();
         let n = residual.len().max(1) as f64;
