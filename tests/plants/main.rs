@@ -15,5 +15,6 @@ mod plant_cli;
 mod plant_explain;
 mod plant_held_out;
 mod plant_hypotheses;
+mod plant_long;
 mod plant_parts;
 mod plant_search;

@@ -219,3 +219,72 @@ impl Found {
         Some(self)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::parse;
+
+    const LAG: &str = "model Lag
+  parameter Real T = 5; input Real u; output Real y; Real x(start=1);
+equation
+  T*der(x) = u - x; y = x;
+end Lag;
+";
+
+    /// A ramp with a jump at 0.7 of it; the input changes after so many samples.
+    fn recording(samples: usize, held: usize) -> PlantRecording {
+        let at = |k: usize| k as f64 / samples as f64;
+        PlantRecording {
+            inputs: vec![
+                (0..samples)
+                    .map(|k| ((k / held * 7) % 5) as f64 - 2.0)
+                    .collect(),
+            ],
+            outputs: vec![
+                (0..samples)
+                    .map(|k| at(k) + if at(k) > 0.7 { 10.0 } else { 0.0 })
+                    .collect(),
+            ],
+            sample_time: 0.1,
+            start_time: 3.0,
+        }
+    }
+
+    fn part_of(text: &str, recordings: &[PlantRecording]) -> Option<Part> {
+        part(&Plant::new(parse(text).unwrap()), recordings, Hold::Zero)
+    }
+
+    #[test]
+    fn every_so_many_samples_where_those_between_add_nothing() {
+        assert!(part_of(LAG, &[recording(6000, 400)]).is_none());
+        let part = part_of(LAG, &[recording(12_000, 1000), recording(7000, 1000)]).unwrap();
+        assert_eq!((part.every, part.searched().samples), (4, 3000 + 1750));
+        let first = &part.recordings[0];
+        assert_eq!((first.sample_time, first.start_time), (0.4, 3.0));
+        assert_eq!(
+            first.outputs[0][2000],
+            recording(12_000, 1000).outputs[0][8000]
+        );
+        assert_eq!(
+            first.inputs[0][2000],
+            recording(12_000, 1000).inputs[0][8000]
+        );
+    }
+
+    #[test]
+    fn a_stretch_where_an_input_changes_meanwhile() {
+        let all = recording(20_000, 3);
+        let part_of_all = part_of(LAG, std::slice::from_ref(&all)).unwrap();
+        let stretch = &part_of_all.recordings[0];
+        assert_eq!((part_of_all.every, stretch.samples()), (1, 5000));
+        // The jump is in it, and its time is that of the recording.
+        assert!(stretch.outputs[0][0] < 1.0 && stretch.outputs[0][4999] > 10.0);
+        let from = ((stretch.start_time - 3.0) / 0.1).round() as usize;
+        assert_eq!(stretch.inputs[0][..], all.inputs[0][from..from + 5000]);
+        // What starts as the text says is searched from its start.
+        let fixed = LAG.replace("start=1", "start=1, fixed=true");
+        let part_of_all = part_of(&fixed, std::slice::from_ref(&all)).unwrap();
+        assert_eq!(part_of_all.recordings[0].start_time, 3.0);
+    }
+}
