@@ -173,3 +173,50 @@ fn what_begins_at_some_time_is_not_compared_across_halves() {
         "{change:?}"
     );
 }
+
+/// A spring is a function of a way, or makes a plant oscillate: what a warm body loses is none, whatever its unit.
+#[test]
+fn a_loss_of_a_plant_that_does_not_oscillate_is_no_spring() {
+    let mut random = ChaCha8Rng::seed_from_u64(7);
+    let input: Vec<f64> = (0..3000 / 60)
+        .flat_map(|_| std::iter::repeat_n(100.0 * random.random::<f64>(), 60))
+        .collect();
+    let run = |loss: f64| -> Vec<f64> {
+        let mut warm = 0.0_f64;
+        let each = input.iter().map(|u| {
+            let now = warm;
+            for _ in 0..10 {
+                warm += 0.01 * (u - 0.5 * warm - loss * warm * warm.abs());
+            }
+            now
+        });
+        each.collect()
+    };
+    let recorded: Vec<f64> = run(0.002)
+        .iter()
+        .map(|y| y + 0.1 * random.sample::<f64, _>(StandardNormal))
+        .collect();
+    for (unit, expected) in [
+        (None, "law"),
+        (Some("K"), "law"),
+        (Some("mm"), "quadratic_stiffness"),
+    ] {
+        let mut logs =
+            [("simulation", run(0.0)), ("recording", recorded.clone())].map(|(name, y)| {
+                let mut log = log(name, input.clone(), vec![y]);
+                log.outputs.truncate(1);
+                log.outputs[0].unit = unit.map(str::to_owned);
+                log
+            });
+        let [simulated, recording] = &mut logs;
+        let found = explain(
+            std::slice::from_ref(recording),
+            &Simulation::Outputs(vec![simulated.clone()]),
+            &Options::default(),
+        )
+        .unwrap();
+        assert_eq!(found.verdict, Verdict::Named, "{:?}", found.summary);
+        assert_eq!(found.effects[0].effect, expected, "{:?}", found.summary);
+        assert_eq!(found.effects[0].depends.is_empty(), expected != "law");
+    }
+}

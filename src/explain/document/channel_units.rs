@@ -16,6 +16,12 @@ const SPEEDS: &[&str] = &[
     "u/min", "rad/s", "rads", "deg/s", "\u{b0}/s", "mps", "rps", "hz",
 ];
 
+/// Units of a way or an angle.
+const POSITIONS: &[&str] = &[
+    "m", "mm", "um", "\u{b5}m", "cm", "km", "in", "ft", "rad", "radian", "radians", "deg",
+    "\u{b0}", "degree", "degrees",
+];
+
 /// The unit of a channel in lower case: of its brackets, else what the name ends with behind an underscore.
 fn written(channel: &Channel) -> Option<String> {
     let unit = channel.unit.clone();
@@ -43,6 +49,11 @@ pub(crate) fn is_speed(channel: &Channel) -> bool {
     written(channel).is_some_and(|written| SPEEDS.contains(&written.as_str()))
 }
 
+/// Whether `channel` is a way or an angle.
+pub(crate) fn is_position(channel: &Channel) -> bool {
+    written(channel).is_some_and(|written| POSITIONS.contains(&written.as_str()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -65,5 +76,8 @@ mod tests {
         assert!(is_speed(&channel("v_kmh", None)));
         assert!(is_speed(&channel("speed", Some("RPM"))));
         assert!(!is_speed(&channel("disp_mm", None)));
+        assert!(is_position(&channel("disp_mm", None)));
+        assert!(is_position(&channel("angle", Some("Deg"))));
+        assert!(!is_position(&channel("T", Some("K"))) && !is_position(&channel("y", None)));
     }
 }

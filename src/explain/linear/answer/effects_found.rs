@@ -17,6 +17,9 @@ use crate::explain::linear::model::structure::Direction;
 use crate::explain::linear::search::penalties::NEEDED;
 use crate::log::Channel;
 
+/// Effects that are called a spring.
+const SPRINGS: [&str; 2] = ["cubic_stiffness", "quadratic_stiffness"];
+
 impl Answer<'_> {
     fn signal_name(&self, effect: &crate::explain::linear::model::structure::Instance) -> String {
         let (inputs, outputs) = self.names();
@@ -114,6 +117,19 @@ impl Answer<'_> {
                 sentence: String::new(),
             };
             effect_found.sentence = sentences::sentence(definition, &effect_found);
+            // A spring is a function of a way or an angle, or makes the plant oscillate. The same function of a temperature or
+            // a level is a loss or an outflow, which linear models cannot tell apart: a law.
+            if SPRINGS.contains(&definition.id)
+                && !crate::explain::document::channel_units::is_position(output)
+                && !structure.coordinates.given.oscillates()
+            {
+                effect_found.effect = "law".to_owned();
+                effect_found.depends = vec![output.name.clone()];
+                effect_found.sentence = format!(
+                    "A function of {} acts where the input does: {}. The plant does not oscillate, so that this is no spring.",
+                    output.name, definition.equation
+                );
+            }
             found.push(effect_found);
         }
         for freeze in &self.finding.freezes {

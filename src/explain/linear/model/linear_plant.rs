@@ -18,6 +18,18 @@ pub(crate) struct Plant {
 }
 
 impl Plant {
+    /// Whether a pole turns by more than a tenth of what it decays by (a damping ratio below 0.995): a double pole that was
+    /// identified may turn a little.
+    pub(crate) fn oscillates(&self) -> bool {
+        const TURNS: f64 = 0.1;
+        let poles = match self.states {
+            0 => vec![],
+            _ => self.a_matrix().complex_eigenvalues().as_slice().to_vec(),
+        };
+        let mut poles = poles.iter();
+        poles.any(|pole| pole.im.abs() > TURNS * (1.0 - pole.re).abs())
+    }
+
     pub(crate) fn from_state_space(system: &StateSpace) -> Self {
         Self {
             states: system.states(),
