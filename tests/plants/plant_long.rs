@@ -74,10 +74,11 @@ fn long_recordings_are_searched_in_a_part_and_fitted_whole() {
         assert_eq!(said["verdict"], "named", "{}", said["summary"]);
         let summary = said["summary"].to_string();
         assert!(summary.contains(which), "{summary}");
-        // 15 000 samples know the limit better than a third of them: at most the deviation of the mean of those beyond it.
+        // The noise has a deviation of 0.01, and 43 % of the samples are beyond the limit: the mean of those of 15 000 samples is
+        // known to 1.2e-4, that of 5000 samples to 2.2e-4.
         let limits = said["effects"][0]["parameters"].as_object().unwrap();
         let std = limits.values().next().unwrap()["std"].as_f64().unwrap();
-        assert!(std < 3e-4, "{limits:?}");
+        assert!((1e-4..1.6e-4).contains(&std), "{limits:?}");
         assert_eq!(said["recordings"][0]["samples"], 15_000);
     }
 }

@@ -12,7 +12,7 @@ use crate::cli::{Outcome, Verbosity};
 use crate::covariance::invariants;
 use crate::identify::{Options, channel_names, identify};
 use crate::log::{Log, RoleNeed, Source};
-use crate::physics::{Excitation, OperatingPoint, OperatingPointError};
+use crate::physics::{OperatingPoint, OperatingPointError};
 use crate::report::text::{linearisation_text, plant_estimate_text, plant_text};
 use crate::report::{
     IdentifiedDocument, LinearisationDocument, Uncertain, frequency_grid, logarithmic, to_json,
@@ -177,20 +177,8 @@ fn means(loaded: &LoadedPlant, logs: &[Log]) -> anyhow::Result<Operating> {
     let runs: Vec<Vec<Vec<f64>>> = logs
         .iter()
         .filter_map(|log| {
-            let columns: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
-            let excitation = Excitation {
-                inputs: &columns,
-                length: log.samples(),
-                sample_time: log.sample_time,
-                start_time: log.start_time,
-                hold: loaded.hold,
-            };
-            Some(
-                plant
-                    .simulate(&loaded.point, &excitation, None)
-                    .ok()?
-                    .states,
-            )
+            let run = plant.run(log, &loaded.point, loaded.hold).ok()?;
+            Some(run.states)
         })
         .collect();
     let start = plant.start(&loaded.point);

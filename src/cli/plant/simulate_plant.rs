@@ -12,7 +12,7 @@ use crate::cli::{Outcome, Verbosity};
 use crate::explain::AugmentedPlant;
 use crate::log::{Channel, RoleNeed, Roles, Source, write_table};
 use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
-use crate::physics::{Excitation, Hold, Point};
+use crate::physics::{Hold, Point};
 use crate::report::{PlantDocument, is_plant};
 
 /// Where the states start.
@@ -142,16 +142,8 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
     if let (Some(original), Start::Text) = (&beside, &asked.start) {
         set_start(&plant, &mut point, &original.start)?;
     }
-    let inputs: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
-    let excitation = Excitation {
-        inputs: &inputs,
-        length: log.samples(),
-        sample_time: log.sample_time,
-        start_time: log.start_time,
-        hold,
-    };
     let mut run = plant
-        .simulate(&point, &excitation, None)
+        .run(&log, &point, hold)
         .map_err(|e| anyhow::anyhow!("{}: {e}", asked.plant.display()))?;
     if let Some(original) = &beside {
         for (y, rest) in run.outputs.iter_mut().zip(&original.remainder) {

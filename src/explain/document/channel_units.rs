@@ -16,7 +16,7 @@ const SPEEDS: &[&str] = &[
     "u/min", "rad/s", "rads", "deg/s", "\u{b0}/s", "mps", "rps", "hz",
 ];
 
-/// Units of a way or an angle.
+/// Units of a position or an angle.
 const POSITIONS: &[&str] = &[
     "m", "mm", "um", "\u{b5}m", "cm", "km", "in", "ft", "rad", "radian", "radians", "deg",
     "\u{b0}", "degree", "degrees",
@@ -49,7 +49,7 @@ pub(crate) fn is_speed(channel: &Channel) -> bool {
     written(channel).is_some_and(|written| SPEEDS.contains(&written.as_str()))
 }
 
-/// Whether `channel` is a way or an angle.
+/// Whether `channel` is a position or an angle.
 pub(crate) fn is_position(channel: &Channel) -> bool {
     written(channel).is_some_and(|written| POSITIONS.contains(&written.as_str()))
 }

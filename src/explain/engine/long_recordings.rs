@@ -1,10 +1,11 @@
 //! Long recordings: effects are searched for in a part of their samples, and what is found is fitted to all of them.
 
 use crate::explain::engine::fitting::fitted::{Fitted, with_more};
+use crate::explain::engine::holdout::{Estimator, all_free};
 use crate::explain::engine::search::Found;
 use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::{EstimateOptions, Fit, Form, PlantRecording, Study};
-use crate::physics::{Excitation, Hold, Plant};
+use crate::physics::{Hold, Plant};
 
 /// Samples that are searched: more than twice as many as a name needs (250 to 2000, math/explain.md).
 const SEARCHED: usize = 5000;
@@ -13,6 +14,7 @@ const LITTLE_MORE: f64 = 0.25;
 /// What samples between those that are kept would add must be less than this part: of the variance of an input, and of the
 /// mean square of what the simulation leaves.
 const NEGLIGIBLE: f64 = 0.01;
+const ROUNDING: f64 = 1e-12;
 
 /// The samples that are searched.
 #[derive(Debug, Clone)]
@@ -77,7 +79,9 @@ fn thinned(recordings: &[PlantRecording], every: usize, hold: Hold) -> Option<Ve
             });
             let level = mean(u);
             let total: f64 = u.iter().map(|u| (u - level).powi(2)).sum();
-            (within.sum::<f64>() <= NEGLIGIBLE * total).then_some(means)
+            // A constant varies by what its mean is rounded by.
+            let rounding = u.iter().map(|u| (ROUNDING * u).powi(2)).sum::<f64>();
+            (within.sum::<f64>() <= NEGLIGIBLE * total + rounding).then_some(means)
         };
         Some(PlantRecording {
             inputs: r.inputs.iter().map(means).collect::<Option<_>>()?,
@@ -93,8 +97,8 @@ fn thinned(recordings: &[PlantRecording], every: usize, hold: Hold) -> Option<Ve
     each.collect()
 }
 
-/// Whether the plant of the text runs over the thinned recordings as over all samples, compared with what it leaves of them;
-/// none where it does not run.
+/// Whether the plant, fitted to the thinned recordings, runs over these as over all samples, compared with what it leaves of them;
+/// none where it does not run. Values of the text may leave so much that any difference were little.
 fn as_before(
     plant: &Plant,
     recordings: &[PlantRecording],
@@ -102,22 +106,14 @@ fn as_before(
     every: usize,
     hold: Hold,
 ) -> Option<bool> {
-    let run = |r: &PlantRecording| {
-        let inputs: Vec<&[f64]> = r.inputs.iter().map(Vec::as_slice).collect();
-        let excitation = Excitation {
-            inputs: &inputs,
-            length: r.samples(),
-            sample_time: r.sample_time,
-            start_time: r.start_time,
-            hold,
-        };
-        let run = plant.simulate(&plant.nominal(), &excitation, None).ok();
-        run.map(|run| run.outputs)
-    };
+    let options = all_free(plant, hold, Estimator::FreeRun);
+    let study = Study::new(plant, thinned, &options).ok()?;
+    let points = study.points(&study.least_squares(&study.nominal())?);
     let outputs = recordings.first()?.outputs.len();
     let mut changed = vec![0.0; outputs];
     let mut left = vec![0.0; outputs];
-    for (r, t) in recordings.iter().zip(thinned) {
+    for ((r, t), point) in recordings.iter().zip(thinned).zip(&points) {
+        let run = |r: &PlantRecording| r.run(plant, point, hold).ok();
         let (whole, few) = (run(r)?, run(t)?);
         for o in 0..outputs {
             let pairs = whole[o].iter().step_by(every).zip(&few[o]);
@@ -180,7 +176,6 @@ impl Found {
             let limited = plant.clone().with_most_steps(MOST_STEPS);
             let study = Study::new(&limited, recordings, options).ok()?;
             let mut point = study.nominal();
-            let gains = &fit.point[fit.point.len().checked_sub(study.gains())?..];
             // Thinned recordings start where all samples do.
             let known = if part.every > 1 {
                 point.len()
@@ -189,7 +184,7 @@ impl Found {
             };
             point[..known].copy_from_slice(&fit.point[..known]);
             if fit.form == Form::Innovation {
-                point.extend(gains);
+                point.extend(&fit.point[fit.point.len().checked_sub(study.gains())?..]);
             }
             let from = Fit {
                 point,
@@ -270,6 +265,16 @@ end Lag;
             first.inputs[0][2000],
             recording(12_000, 1000).inputs[0][8000]
         );
+    }
+
+    #[test]
+    fn an_input_that_stays_constant_is_thinned() {
+        let mut decay = recording(11_000, 1);
+        decay.inputs[0].fill(0.1);
+        decay.outputs[0] = (0..11_000)
+            .map(|k| 0.1 + (-0.002 * f64::from(k)).exp() + 0.01 * (2.3 * f64::from(k)).sin())
+            .collect();
+        assert_eq!(part_of(LAG, &[decay]).unwrap().every, 3);
     }
 
     #[test]

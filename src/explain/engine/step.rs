@@ -17,8 +17,7 @@ use super::screening::screen::{Lead, Screen, screen};
 use super::terms::names::{SPECIFIC, named, rank_of};
 use super::thresholds::{
     AT_A_PLACE, BETTER, COMPARED, FINISHED, FITTED, FOLLOWS, FORETOLD, GLANCE, GLANCED,
-    GLANCED_ACCURACY, GLANCED_STEPS, IMITATED, LEFT, MOST, MOST_STEPS, NEEDED, OF_A_KIND, THOROUGH,
-    chance,
+    GLANCED_STEPS, IMITATED, LEFT, MOST, MOST_STEPS, NEEDED, OF_A_KIND, THOROUGH, chance,
 };
 use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{EstimateOptions, Fit, Form, PlantRecording, Study};
@@ -240,11 +239,7 @@ pub(super) fn step(stage: &Stage) -> Step {
         .filter_map(|(i, screen, from, lead)| {
             let made = candidate(&plant.spec, &lead, &screen.arguments, recordings)?;
             let options = with_more(options, made.values.len());
-            let rough = made
-                .plant
-                .clone()
-                .with_accuracy(GLANCED_ACCURACY)
-                .with_most_steps(GLANCED_STEPS);
+            let rough = made.rough(GLANCED_STEPS);
             let inner = study.of(&rough, &options).ok()?;
             let start = match screen.strays {
                 true => started(&inner, &made, &lead, (study, from)),
@@ -286,11 +281,7 @@ pub(super) fn step(stage: &Stage) -> Step {
         .filter_map(|(lead, which, made, from)| {
             let arguments = &tried[which].0.arguments;
             let options = with_more(options, made.values.len());
-            let rough = made
-                .plant
-                .clone()
-                .with_accuracy(GLANCED_ACCURACY)
-                .with_most_steps(MOST_STEPS);
+            let rough = made.rough(MOST_STEPS);
             let inner = study.of(&rough, &options).ok()?;
             // Where an observer had to follow what was missing, a free run may do now.
             let mut starts = vec![from.clone()];

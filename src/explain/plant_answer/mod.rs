@@ -36,7 +36,7 @@ use crate::identify::Recording;
 use crate::log::{Channel, Log};
 use crate::noise::Series;
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
-use crate::physics::{Excitation, Hold, ModelSpec, Plant, Span, units_in_words};
+use crate::physics::{Hold, ModelSpec, Plant, Span, units_in_words};
 
 /// A parameter is said to differ from the text where it does by so many standard deviations.
 const DIFFERENT: f64 = 3.3;
@@ -158,19 +158,7 @@ impl Answer<'_> {
     fn given(&self) -> Option<Series> {
         let mut all = Series::new();
         for r in self.recordings {
-            let inputs: Vec<&[f64]> = r.inputs.iter().map(Vec::as_slice).collect();
-            let excitation = Excitation {
-                inputs: &inputs,
-                length: r.outputs.first().map_or(0, Vec::len),
-                sample_time: r.sample_time,
-                start_time: r.start_time,
-                hold: self.hold,
-            };
-            let run = self
-                .plant
-                .simulate(&self.plant.nominal(), &excitation, None)
-                .ok()?;
-            all.extend(run.outputs);
+            all.extend(r.run(self.plant, &self.plant.nominal(), self.hold).ok()?);
         }
         Some(all)
     }

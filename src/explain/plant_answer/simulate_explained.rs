@@ -3,7 +3,7 @@
 use crate::explain::explanation::AugmentedPlant;
 use crate::log::Log;
 use crate::physics::estimate::{EstimateError, EstimateOptions, Form, PlantRecording, estimate};
-use crate::physics::{Excitation, Hold, Plant, Point, SimulationError, parse};
+use crate::physics::{Hold, Plant, SimulationError, parse};
 
 /// Why an explained plant cannot be run.
 #[derive(Debug, thiserror::Error)]
@@ -41,23 +41,6 @@ fn plant_of(text: &str) -> Result<Plant, AugmentedPlantError> {
         what: e.render("plant", text),
     };
     Ok(Plant::new(parse(text).map_err(damaged)?))
-}
-
-fn run(
-    plant: &Plant,
-    point: &Point,
-    log: &Log,
-    hold: Hold,
-) -> Result<Vec<Vec<f64>>, SimulationError> {
-    let inputs: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
-    let excitation = Excitation {
-        inputs: &inputs,
-        length: log.samples(),
-        sample_time: log.sample_time,
-        start_time: log.start_time,
-        hold,
-    };
-    Ok(plant.simulate(point, &excitation, None)?.outputs)
 }
 
 impl AugmentedPlant {
@@ -103,7 +86,7 @@ impl AugmentedPlant {
         let Some(point) = fitted.points.first() else {
             return Ok(None);
         };
-        let own = run(&plant, point, log, hold)?;
+        let own = plant.run(log, point, hold)?.outputs;
         let states = plant.spec.states().into_iter().zip(&point.start);
         Ok(Some(Original {
             start: states
@@ -140,13 +123,13 @@ impl AugmentedPlant {
             None => None,
         };
         let Some(original) = original else {
-            return Ok(run(&plant, &point, log, self.hold())?);
+            return Ok(plant.run(log, &point, self.hold())?.outputs);
         };
         for (start, v) in point.start.iter_mut().zip(plant.spec.states()) {
             let known = original.start.iter().find(|(name, _)| name == named(v));
             *start = known.map_or(*start, |(_, value)| Some(*value));
         }
-        let mut outputs = run(&plant, &point, log, self.hold())?;
+        let mut outputs = plant.run(log, &point, self.hold())?.outputs;
         for (y, rest) in outputs.iter_mut().zip(&original.remainder) {
             y.iter_mut().zip(rest).for_each(|(y, rest)| *y += rest);
         }

@@ -11,7 +11,9 @@ use crate::log::Log;
 use crate::noise::{Colours, Mask, Noise, Series};
 use crate::physics::external::ExternalError;
 use crate::physics::simulated::{RunError, Simulated};
-use crate::physics::simulation::{Excitation, Plan, Point, SimulationError};
+use crate::physics::simulation::{
+    Excitation, Hold, Plan, Plant, Point, SimulationError, Trajectory,
+};
 use crate::physics::spec::{ModelSpec, VariableKind};
 
 /// A recording of a plant.
@@ -107,6 +109,37 @@ pub(super) struct Columns<'a> {
     pub(super) outputs: Vec<&'a [f64]>,
 }
 
+fn run(
+    plant: &Plant,
+    point: &Point,
+    inputs: &[Vec<f64>],
+    (length, sample_time, start_time): (usize, f64, f64),
+    hold: Hold,
+) -> Result<Trajectory, SimulationError> {
+    let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
+    let excitation = Excitation {
+        inputs: &inputs,
+        length,
+        sample_time,
+        start_time,
+        hold,
+    };
+    plant.simulate(point, &excitation, None)
+}
+
+impl Plant {
+    /// Runs freely over a log.
+    pub(crate) fn run(
+        &self,
+        log: &Log,
+        point: &Point,
+        hold: Hold,
+    ) -> Result<Trajectory, SimulationError> {
+        let times = (log.samples(), log.sample_time, log.start_time);
+        run(self, point, &log.input_data, times, hold)
+    }
+}
+
 impl PlantRecording {
     pub(super) fn columns(&self) -> Columns<'_> {
         Columns {
@@ -117,6 +150,17 @@ impl PlantRecording {
 
     pub(crate) fn samples(&self) -> usize {
         self.outputs.first().map_or(0, Vec::len)
+    }
+
+    /// Outputs of a plant that runs freely over the recording.
+    pub(crate) fn run(
+        &self,
+        plant: &Plant,
+        point: &Point,
+        hold: Hold,
+    ) -> Result<Series, SimulationError> {
+        let times = (self.samples(), self.sample_time, self.start_time);
+        Ok(run(plant, point, &self.inputs, times, hold)?.outputs)
     }
 }
 

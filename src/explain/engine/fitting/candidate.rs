@@ -5,6 +5,7 @@ use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::term::{Port, Starts};
 use crate::explain::engine::terms::values::filled;
+use crate::explain::engine::thresholds::GLANCED_ACCURACY;
 use crate::physics::estimate::{Fit, PlantRecording};
 use crate::physics::{ModelSpec, Plant};
 
@@ -207,6 +208,12 @@ pub(in crate::explain::engine) fn equation_text(
 }
 
 impl Candidate {
+    /// The plant with the term, simulated as accurately as fits need that are only compared, in so many steps a sample at most.
+    pub(crate) fn rough(&self, most_steps: usize) -> Plant {
+        let plant = self.plant.clone().with_accuracy(GLANCED_ACCURACY);
+        plant.with_most_steps(most_steps)
+    }
+
     /// The numbers of a fit of the plant without the term, with the term's.
     pub(crate) fn from(&self, fit: &Fit, parameters: usize) -> Fit {
         let (own, others) = fit.point.split_at(parameters);

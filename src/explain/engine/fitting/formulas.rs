@@ -11,7 +11,7 @@ use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::term::{Needs, Port, Starts, Term, curve, shape};
 use crate::explain::engine::terms::values::{Instance, evaluate, grid};
-use crate::explain::engine::thresholds::{GLANCED_ACCURACY, MOST_STEPS, ROUNDS, THOROUGH};
+use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::{Fit, Study};
 
 const WIDTHS: Starts = Starts::Spread(&[0.1, 0.2, 0.5, 1.0, 2.0]);
@@ -155,11 +155,7 @@ pub(super) fn in_its_place(
     lead.strength = strength;
     let made = candidate(&plant.spec, &lead, arguments, ground.recordings)?;
     let options = with_more(ground.options, made.values.len());
-    let rough = made
-        .plant
-        .clone()
-        .with_accuracy(GLANCED_ACCURACY)
-        .with_most_steps(MOST_STEPS);
+    let rough = made.rough(MOST_STEPS);
     let inner = study.of(&rough, &options).ok()?;
     let parameters = study.parameters();
     let without = best.without_term(parameters);

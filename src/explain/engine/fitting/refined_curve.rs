@@ -7,7 +7,7 @@ use crate::explain::engine::screening::curve::Curve;
 use crate::explain::engine::screening::projection::Projection;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
-use crate::explain::engine::thresholds::{GLANCED_ACCURACY, MOST_STEPS, ROUNDS, THOROUGH};
+use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::Fit;
 
 /// Rounds in which knots are added.
@@ -76,12 +76,7 @@ fn refined(
     };
     let rough = |made: &Candidate| {
         let options = with_more(ground.options, made.values.len());
-        let plant = made
-            .plant
-            .clone()
-            .with_accuracy(GLANCED_ACCURACY)
-            .with_most_steps(MOST_STEPS);
-        (plant, options)
+        (made.rough(MOST_STEPS), options)
     };
     // A score test of every new knot, beside the curve as it is: with all of them in it, it is the same function.
     let projection = {

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::linear_answer::Answer;
+use crate::explain::document::channel_units::{is_position, is_speed};
 use crate::explain::document::sentences;
-use crate::explain::effects::{self, Action, Port};
+use crate::explain::effects::{self, Action, Definition, Port};
 use crate::explain::explanation::{
     Alternative, Detectable, EFFECTS_TIE, EffectFound, Evidence, Quantity, Verdict,
 };
@@ -13,12 +14,34 @@ use crate::explain::linear::fit::{Fit, Problem};
 use crate::explain::linear::model::functionals::{
     Functionals, Signal, dot, matched_sign, static_equivalent,
 };
+use crate::explain::linear::model::linear_plant::Plant;
 use crate::explain::linear::model::structure::Direction;
 use crate::explain::linear::search::penalties::NEEDED;
 use crate::log::Channel;
 
-/// Effects that are called a spring.
-const SPRINGS: [&str; 2] = ["cubic_stiffness", "quadratic_stiffness"];
+/// What a force that depends on an output is called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Called {
+    /// As the library calls it.
+    Itself,
+    /// What grows with the square of a speed is a drag, whatever state of the plant it is.
+    Drag,
+    /// A spring is a function of a position or an angle, or makes the plant oscillate. The same function of a temperature or a level
+    /// is a loss or an outflow, which linear models cannot tell apart.
+    Law,
+}
+
+fn called(definition: &Definition, output: &Channel, plant: &Plant) -> Called {
+    match definition.id {
+        "quadratic_stiffness" if definition.variant == "odd" && is_speed(output) => Called::Drag,
+        "quadratic_stiffness" | "cubic_stiffness"
+            if !is_position(output) && !plant.oscillates() =>
+        {
+            Called::Law
+        }
+        _ => Called::Itself,
+    }
+}
 
 impl Answer<'_> {
     fn signal_name(&self, effect: &crate::explain::linear::model::structure::Instance) -> String {
@@ -81,18 +104,16 @@ impl Answer<'_> {
                 let from = offset + amplitudes + definition.parameters.len();
                 signal = self.sine_amplitudes(model, index, from, covariance, &mut parameters);
             }
-            // What grows with the square of a speed is a drag, whatever state of the plant it is.
-            let of_speed = definition.id == "quadratic_stiffness"
-                && definition.variant == "odd"
-                && crate::explain::document::channel_units::is_speed(output);
-            if of_speed && let Some(drag) = parameters.remove("stiffness") {
+            let called = called(definition, output, &structure.coordinates.given);
+            let definition = match called {
+                Called::Drag => effects::find("quadratic_drag", "").unwrap_or(definition),
+                _ => definition,
+            };
+            if called == Called::Drag
+                && let Some(drag) = parameters.remove("stiffness")
+            {
                 parameters.insert("drag".to_owned(), drag);
             }
-            let definition = if of_speed {
-                effects::find("quadratic_drag", "").unwrap_or(definition)
-            } else {
-                definition
-            };
             let mut effect_found = EffectFound {
                 hypothesis: false,
                 enters: None,
@@ -117,16 +138,12 @@ impl Answer<'_> {
                 sentence: String::new(),
             };
             effect_found.sentence = sentences::sentence(definition, &effect_found);
-            // A spring is a function of a way or an angle, or makes the plant oscillate. The same function of a temperature or
-            // a level is a loss or an outflow, which linear models cannot tell apart: a law.
-            if SPRINGS.contains(&definition.id)
-                && !crate::explain::document::channel_units::is_position(output)
-                && !structure.coordinates.given.oscillates()
-            {
+            if called == Called::Law {
                 effect_found.effect = "law".to_owned();
                 effect_found.depends = vec![output.name.clone()];
                 effect_found.sentence = format!(
-                    "A function of {} acts where the input does: {}. The plant does not oscillate, so that this is no spring.",
+                    "A function of {0} acts where the input does: {1}. The plant does not oscillate, and {0} has no unit of a position: \
+                     a spring, a loss and an outflow look alike.",
                     output.name, definition.equation
                 );
             }

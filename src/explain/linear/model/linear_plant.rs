@@ -18,16 +18,19 @@ pub(crate) struct Plant {
 }
 
 impl Plant {
-    /// Whether a pole turns by more than a tenth of what it decays by (a damping ratio below 0.995): a double pole that was
-    /// identified may turn a little.
+    /// Whether a pole has a damping ratio below 0.995: an identified double pole may be a pair that turns a little. A negative
+    /// real pole of a sampled plant does not count.
     pub(crate) fn oscillates(&self) -> bool {
         const TURNS: f64 = 0.1;
-        let poles = match self.states {
-            0 => vec![],
-            _ => self.a_matrix().complex_eigenvalues().as_slice().to_vec(),
-        };
-        let mut poles = poles.iter();
-        poles.any(|pole| pole.im.abs() > TURNS * (1.0 - pole.re).abs())
+        if self.states == 0 {
+            return false;
+        }
+        let poles = self.a_matrix().complex_eigenvalues();
+        let mut pairs = poles
+            .iter()
+            .filter(|pole| pole.im != 0.0)
+            .map(|pole| pole.ln());
+        pairs.any(|pole| pole.im.abs() > TURNS * pole.re.abs())
     }
 
     pub(crate) fn from_state_space(system: &StateSpace) -> Self {
