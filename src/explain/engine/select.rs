@@ -91,8 +91,13 @@ fn decide(
     let mut judged = rivals.iter().any(|r| r.held_out.follows());
     let stays = rivals.iter().any(|r| r.held_out.stays());
     let mut chosen = (0, searches[0].accepted);
+    // Where least squares simulates better than the noise allows, a coloured noise stands for what is missing: little may be left
+    // of the likelihood, and much of the free run.
+    let misspecified = rivals
+        .iter()
+        .any(|r| r.accepted == searches[0].accepted && r.misspecified);
     // With an observer the residuals are white wherever the observer follows: that proves no effect.
-    let proved = (adequate || little_left)
+    let proved = (adequate || little_left && !misspecified)
         && (searches[0].accepted == 0 || searches[0].fit.form == Form::FreeRun);
     if stays && !(judged && holds && proved) {
         let known = rivals
