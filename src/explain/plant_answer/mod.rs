@@ -15,6 +15,7 @@ pub use simulate_explained::{AugmentedPlantError, Original};
 
 use nalgebra::DMatrix;
 
+use self::plant_summary::as_good;
 use self::stated_probability::probability;
 use self::where_to_look::experiment;
 use self::within_bounds::within_bounds;
@@ -262,6 +263,8 @@ impl Answer<'_> {
             );
         }
         let alternatives = self.alternatives(verdict);
+        let closest = effects.first().filter(|_| verdict == Verdict::Unexplained);
+        summary.extend(closest.and_then(|e| as_good(e, &alternatives)));
         let separating_experiment = (verdict == Verdict::Unexplained).then(|| {
             let candidates = effects.iter().map(|e| &e.effect);
             let best = candidates

@@ -4,12 +4,17 @@ use super::Answer;
 use super::where_to_look::places;
 use super::within_bounds::at_bounds;
 use crate::explain::document::sentences::{number, quantity};
+use crate::explain::engine::fitting::fitted::TIE;
 use crate::explain::engine::select::CHANCE;
-use crate::explain::explanation::{EffectFound, FitSteps, ParameterChange, Quantity, Verdict};
+use crate::explain::explanation::{
+    Alternative, EffectFound, FitSteps, ParameterChange, Quantity, Verdict,
+};
 use crate::physics::estimate::PlantRecording;
 
 /// Parameters of an effect that the summary lists.
 const MOST_ESTIMATES: usize = 6;
+/// Rivals that it lists.
+const MOST_RIVALS: usize = 4;
 
 impl Answer<'_> {
     pub(super) fn summary(
@@ -99,6 +104,19 @@ impl Answer<'_> {
     }
 }
 
+/// What explains the recording as well as the effect that is said to be the closest; none where nothing does.
+pub(super) fn as_good(closest: &EffectFound, alternatives: &[Alternative]) -> Option<String> {
+    let others = alternatives.iter().filter(|a| {
+        a.effect != closest.effect && closest.evidence.criterion_gain - a.criterion_gain <= TIE.0
+    });
+    let names: Vec<String> = others
+        .take(MOST_RIVALS)
+        .map(|a| a.effect.replace('_', " "))
+        .collect();
+    let first = closest.effect.replace('_', " ");
+    (!names.is_empty()).then(|| format!("As good as {first} by BIC: {}.", names.join(", ")))
+}
+
 /// The parameters of an effect with their standard deviations; none for a curve, which has too many.
 fn estimates(effect: &EffectFound) -> Option<String> {
     let few = (1..=MOST_ESTIMATES).contains(&effect.parameters.len());
@@ -107,4 +125,29 @@ fn estimates(effect: &EffectFound) -> Option<String> {
         .map(|(name, q)| format!("{name} = {}", quantity(q)))
         .collect();
     few.then(|| format!("Estimated: {}.", each.join("; ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::columns::tests::drag;
+
+    #[test]
+    fn what_is_as_good_as_the_closest_is_listed() {
+        let closest = &drag().effects[0];
+        let rival = |id: &str, less: f64| Alternative {
+            effect: id.to_owned(),
+            support: 1.0,
+            criterion_gain: closest.evidence.criterion_gain - less,
+            why_not: String::new(),
+        };
+        let all = [
+            rival(&closest.effect, 0.0),
+            rival("natural_convection", 5.0),
+            rival("sensor_offset", 7.0),
+        ];
+        let said = as_good(closest, &all).unwrap();
+        assert!(said.ends_with("by BIC: natural convection."), "{said}");
+        assert_eq!(as_good(closest, &all[..1]), None);
+    }
 }
