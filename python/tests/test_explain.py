@@ -89,23 +89,40 @@ def test_a_simulator_whose_equations_are_found_simulates_without_it():
     assert np.array_equal(restored.simulate(new), simulation)
 
 
-def test_a_simulator_that_is_not_linear_corrects_its_own_answer():
-    """Known by its outputs alone, it is asked again for new inputs."""
+def logarithmic(u):
+    """A simulator that no equations with few terms reproduce: the scale of its output is a logarithm."""
+    return np.arcsinh(4.0 * scipy.signal.lfilter([0.05], [1.0, -0.95], np.ravel(u)))
 
-    def simulator(u):
-        # No equation of the outputs has few terms: their scale is a logarithm.
-        return np.arcsinh(4.0 * scipy.signal.lfilter([0.05], [1.0, -0.95], np.ravel(u)))
 
-    def steps(rng):
-        return np.repeat(rng.uniform(-1.5, 1.5, 100), 30)
+def steps(rng):
+    return np.repeat(rng.uniform(-1.5, 1.5, 100), 30)
 
+
+def test_a_sensor_is_found_whatever_the_simulator_is():
+    """Its explanation asks the simulator again for new inputs."""
     rng = np.random.default_rng(3)
     u = steps(rng)
-    y = np.minimum(simulator(u), 1.0) + 0.01 * rng.standard_normal(len(u))
-    found = innovant.explain(u, y, simulation=simulator, dt=0.01)
+    y = np.minimum(logarithmic(u), 1.0) + 0.01 * rng.standard_normal(len(u))
+    found = innovant.explain(u, y, simulation=logarithmic, dt=0.01)
+    assert [effect.effect for effect in found.effects] == ["sensor_saturation"]
+    new = steps(rng)
+    simulation = found.simulate(new)
+    assert np.sqrt(np.mean((np.ravel(simulation) - np.minimum(logarithmic(new), 1.0)) ** 2)) < 0.01
+    restored = pickle.loads(pickle.dumps(found))
+    with pytest.raises(innovant.InnovantError, match="y_simulated; give the simulator's answer"):
+        restored.simulate(new)
+    assert np.array_equal(restored.simulate(new, simulation=logarithmic(new)), simulation)
+
+
+def test_a_simulator_that_is_not_linear_corrects_its_own_answer():
+    """Known by its outputs alone, it is asked again for new inputs."""
+    rng = np.random.default_rng(3)
+    u = steps(rng)
+    y = logarithmic(np.minimum(u, 1.0)) + 0.01 * rng.standard_normal(len(u))
+    found = innovant.explain(u, y, simulation=logarithmic, dt=0.01)
     new = steps(rng)
     simulation = found.simulate(new)
     restored = pickle.loads(pickle.dumps(found))
     with pytest.raises(innovant.InnovantError, match="relative to a simulator that is not linear"):
         restored.simulate(new)
-    assert np.array_equal(restored.simulate(new, simulation=simulator(new)), simulation)
+    assert np.array_equal(restored.simulate(new, simulation=logarithmic(new)), simulation)

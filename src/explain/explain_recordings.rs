@@ -1,4 +1,4 @@
-//! The question: which ways of answering it are gone, and which of them speaks.
+//! The question about a linear model or columns: the ways of answering it, and the choice between their answers.
 
 use super::columns;
 use super::compare_explanations::{agree, doubt, is_doubtful, stands_in};
@@ -10,7 +10,9 @@ use super::linear::check::Checked;
 use super::linear::data::Data;
 use super::linear::decision::averaged_decision::attempt;
 use super::linear::decision::output_error_decision::{Finding, inquire};
-use super::linear::known_simulation::know;
+use super::linear::known::Known;
+use super::linear::known_simulation::{Simulator, know};
+use super::linear::nonlinear_simulator::NonlinearSimulator;
 use super::linear::screening::output_adequacy::LEVEL;
 use super::memory;
 use super::simulation::Simulation;
@@ -59,24 +61,31 @@ pub fn explain(
     let allowed = |d: &Definition| allowed_id(d.id) && d.unit_of_output().is_none_or(measured);
     // The data before the physics: from here on they are as repaired.
     let checked = Checked::new(recordings, simulation, &allowed_id);
-    let recordings = checked.recordings.as_slice();
-    let known = know(&checked)?;
-    let relative = known.relative;
-    // Equations that reproduce columns make the simulator's own parameters and variables known, which the difference to columns
-    // does not. Data that were repaired are left to the search that knows how.
-    let equations = (relative && checked.troubles.is_empty())
-        .then(|| columns::equations(&checked))
-        .flatten();
-    let by_equations =
-        || columns::explain_equations(equations.as_ref()?, &checked, &options.without);
-    if equations
-        .as_ref()
-        .is_some_and(|e| e.misfit <= columns::REPRODUCED)
-        && let Some(explanation) = by_equations()
-    {
-        return Ok(explanation);
+    match know(&checked)? {
+        Simulator::Linear(known) => explain_linear(*known, &checked, &allowed, options.seed),
+        Simulator::Nonlinear(simulator) => {
+            explain_nonlinear(&simulator, &checked, &allowed, options)
+        }
     }
-    let drive = attempt(recordings, &known, &allowed);
+}
+
+/// Which effects may be named.
+type Allowed<'a> = dyn Fn(&Definition) -> bool + Sync + 'a;
+
+fn no_fit(checked: &Checked) -> ExplainError {
+    let name = checked.recordings.first().map(|r| r.name.clone());
+    ExplainError::NoFit {
+        name: name.unwrap_or_default(),
+    }
+}
+
+fn explain_linear(
+    known: Known,
+    checked: &Checked,
+    allowed: &Allowed,
+    seed: u64,
+) -> Result<Explanation, ExplainError> {
+    let drive = attempt(&checked.recordings, &known, allowed);
     // What a law in the averaged equation of a drive explains to noise needs no other way, and the rest little. Where no law
     // was found, the equation may be blind to what there is (effects of the sensor, another mode), and where a spring
     // brings the mass back or a speed is measured, a free run tells as well.
@@ -88,9 +97,9 @@ pub fn explain(
                 .is_none_or(|a| a.p_value > LEVEL || a.share < MOSTLY_NOISE)
     });
     let ordinary = (!settled)
-        .then(|| inquire(&known, checked.mask(&known.data), &allowed))
+        .then(|| inquire(&known, checked.mask(&known.data), allowed))
         .flatten();
-    let (known, mut finding, mask) = match (drive, ordinary) {
+    let (known, finding, mask) = match (drive, ordinary) {
         (Some((drive, averaged, counted)), Some((finding, mask)))
             if tells_more(
                 (&finding, &known.data, &mask),
@@ -101,25 +110,44 @@ pub fn explain(
         }
         (Some(drive), _) => drive,
         (None, Some((finding, mask))) => (known, finding, mask),
-        (None, None) => {
-            return Err(ExplainError::NoFit {
-                name: recordings[0].name.clone(),
-            });
-        }
+        (None, None) => return Err(no_fit(checked)),
     };
-    finding.add(checked.troubles.clone());
-    let mut explanation = Answer {
-        recordings,
-        known: &known,
-        finding: &finding,
-        mask,
-        seed: options.seed,
-    }
-    .say();
-    // Where equations reproduce the columns roughly, a doubtful answer relative to the columns stands against theirs. The one
-    // whose run follows the recording closer is given.
-    if !relative || !is_doubtful(&explanation) {
+    Ok(said(&known, checked, (finding, mask), seed))
+}
+
+fn explain_nonlinear(
+    simulator: &NonlinearSimulator,
+    checked: &Checked,
+    allowed: &Allowed,
+    options: &Options,
+) -> Result<Explanation, ExplainError> {
+    // Equations that reproduce columns make the simulator's own parameters and variables known, which the difference to columns
+    // does not. Data that were repaired are left to the search that knows how.
+    let sound = checked.troubles.is_empty();
+    let equations = sound.then(|| columns::equations(checked)).flatten();
+    let by_equations =
+        || columns::explain_equations(equations.as_ref()?, checked, &options.without);
+    if equations
+        .as_ref()
+        .is_some_and(|e| e.misfit <= columns::REPRODUCED)
+        && let Some(explanation) = by_equations()
+    {
         return Ok(explanation);
+    }
+    let known = simulator.learn(checked)?;
+    let found = inquire(&known, checked.mask(&known.data), allowed);
+    let found = found.ok_or_else(|| no_fit(checked))?;
+    let mut explanation = said(&known, checked, found, options.seed);
+    // A doubtful answer relative to the columns stands against effects of the sensors, which need no equations, and against
+    // equations that reproduce the columns roughly. The one whose run follows the recording closer is given.
+    if !is_doubtful(&explanation) {
+        return Ok(explanation);
+    }
+    if sound
+        && let Some(sensors) = columns::explain_sensors(checked, &options.without)
+        && stands_in(&sensors, &explanation)
+    {
+        return Ok(sensors);
     }
     Ok(match by_equations() {
         Some(equations) if stands_in(&equations, &explanation) => equations,
@@ -129,6 +157,23 @@ pub fn explain(
             explanation
         }
     })
+}
+
+fn said(
+    known: &Known,
+    checked: &Checked,
+    (mut finding, mask): (Finding, Mask),
+    seed: u64,
+) -> Explanation {
+    finding.add(checked.troubles.clone());
+    Answer {
+        recordings: &checked.recordings,
+        known,
+        finding: &finding,
+        mask,
+        seed,
+    }
+    .say()
 }
 
 /// Whether the finding is an averaged equation of what is no drive, but a mass on a spring.

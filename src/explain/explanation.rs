@@ -158,6 +158,9 @@ pub struct AugmentedPlant {
     /// Equations that reproduce the simulated outputs, where only these were given: its parameters are those of the simulation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulation: Option<String>,
+    /// Its last inputs, which are the outputs of the simulation, where only these were given and sensors are explained.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub simulated_inputs: Vec<String>,
     /// Parameters that say when something has changed. Another recording comes after that.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub times_of_change: Vec<String>,

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _innovant, frames, html, plots
@@ -100,30 +101,39 @@ class Explanation:
         """Simulation with the missing physics in it, on new inputs, in the units of the recording.
 
         `u` is samples x inputs or a frame with the columns of the inputs. An explanation relative to a simulator that is
-        not linear needs the answer of that simulator to the same inputs, `simulation`; when it was made with a function,
-        that is called. Of a plant in equations `x0` gives initial states by name, and `dt` is the sample time of `u`: that
+        not linear, or of its sensors, needs the answer of that simulator to the same inputs, `simulation`; when it was made
+        with a function, that is called. Of a plant in equations `x0` gives initial states by name, and `dt` is the sample time of `u`: that
         of the recording without it, which a document does not contain.
         """
         plant = self.plant
         if plant is not None:
-            return frames.like(u, self._simulate_plant(plant, u, x0, dt), plant.outputs)
+            return frames.like(u, self._simulate_plant(plant, u, x0, simulation, dt), plant.outputs)
         inputs, outputs = self._core.names()
         columns = frames.by_names(u, inputs, "u", dt=self._dt)
-        given = None
-        if self._core.needs_simulation():
-            if simulation is None:
-                simulation = self._simulator
-            if callable(simulation):
-                simulation = simulation(u)
-            given = None if simulation is None else frames.by_names(simulation, outputs, "y", label="simulation")
+        given = self._answer(u, simulation, outputs) if self._core.needs_simulation() else None
         state = None if x0 is None else [float(x) for x in frames.numbers(x0, "x0").reshape(-1)]  # type: ignore[arg-type]
         return frames.like(u, self._core.simulate(columns, state, given), outputs)
 
-    def _simulate_plant(self, plant: Plant, u: Any, x0: Any, dt: float | None) -> Array:
+    def _answer(self, u: Any, simulation: Any, outputs: list[str]) -> Array | None:
+        """The simulator's answer to new inputs, as it is given or as the function that was explained computes it."""
+        if simulation is None:
+            simulation = self._simulator
+        if callable(simulation):
+            simulation = simulation(u)
+        return None if simulation is None else frames.by_names(simulation, outputs, "y", label="simulation")
+
+    def _simulate_plant(self, plant: Plant, u: Any, x0: Any, simulation: Any, dt: float | None) -> Array:
         if x0 is not None and not isinstance(x0, Mapping):
             raise InnovantError('x0: a plant in equations takes initial states by name, as {"phi": 0.1}')
         hold = self._record["plant"].get("hold", "zero")
         step = frames.sample_time(u, dt if dt is not None else None if frames.index_time(u, "u") else self._dt)
+        measured = self._record["plant"].get("simulated_inputs", [])
+        if measured:
+            answer = self._answer(u, simulation, plant.outputs)
+            if answer is None:
+                raise InnovantError(f"simulation: the sensors measure {', '.join(measured)}; give the simulator's answer to u")
+            recorded = [name for name in plant.inputs if name not in measured]
+            u = np.hstack([frames.by_names(u, recorded, "u", dt=self._dt), answer])
         # Another recording comes after what changed in the first.
         changed = {name: -step for name in self._record["plant"].get("times_of_change", [])}
         return plant.simulate(u, step, parameters=changed, start=x0, hold=hold)

@@ -138,7 +138,18 @@ pub(crate) fn read_recordings(
     need: RoleNeed,
     say: Verbosity,
 ) -> anyhow::Result<(Vec<Log>, Vec<Recording>)> {
-    let (inputs, outputs) = channels(plant);
+    read_channels(plant, channels(plant), sources, flags, need, say)
+}
+
+/// Reads these channels of a plant; one with gaps is several.
+pub(super) fn read_channels(
+    plant: &Plant,
+    (inputs, outputs): (Vec<IdentifiedChannel>, Vec<IdentifiedChannel>),
+    sources: &[Source],
+    flags: &RoleFlags,
+    need: RoleNeed,
+    say: Verbosity,
+) -> anyhow::Result<(Vec<Log>, Vec<Recording>)> {
     let roles: Roles = flags.clone().of_model(&inputs, &outputs)?;
     let need = if inputs.is_empty() {
         RoleNeed::OutputsOnly

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::load_plant::{
-    LoadedPlant, all_known, assignments, load, read_recordings, read_with, set_parameters,
+    LoadedPlant, all_known, assignments, channels, load, read_channels, read_with, set_parameters,
     set_start, tell_warnings,
 };
 use crate::cli::flags::RoleFlags;
@@ -63,8 +63,12 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
     } else {
         RoleNeed::InputsOnly
     };
-    let (mut logs, _) = read_recordings(
+    let found = explanation.as_ref().and_then(|e| e.plant.as_ref());
+    let (mut inputs, outputs) = channels(&plant);
+    inputs.retain(|i| found.is_none_or(|f| !f.simulated_inputs.contains(&i.channel.name)));
+    let (mut logs, _) = read_channels(
         &plant,
+        (inputs, outputs),
         std::slice::from_ref(asked.input),
         asked.roles,
         need,
@@ -76,7 +80,24 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
             asked.input
         );
     }
-    let log = logs.remove(0);
+    let mut log = logs.remove(0);
+    let simulated = match (asked.simulation, found) {
+        (Some(file), Some(found)) => Some(simulated(found, file, asked.roles, say)?),
+        _ => None,
+    };
+    let original = found
+        .map(|found| found.original(&log, simulated.as_deref(), hold))
+        .transpose()
+        .map_err(|e| anyhow::anyhow!("{}: {e}", asked.simulation.unwrap_or(asked.plant).display()))?
+        .flatten();
+    if asked.simulation.is_some() && original.is_none() {
+        anyhow::bail!(
+            "{}: --simulation belongs to an explanation of simulated columns, and this plant was given as equations; leave it out",
+            asked.plant.display()
+        );
+    }
+    let original = original.unwrap_or_default();
+    log.input_data.extend(original.inputs.iter().cloned());
     if let Some(explanation) = &explanation
         && let Some(found) = &explanation.plant
         && !all_known(&explanation.recordings, std::slice::from_ref(&log))
@@ -116,40 +137,14 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
             point.start = found.points[0].start.clone();
         }
     }
-    let beside = match asked.simulation {
-        Some(file) => {
-            let found = explanation.as_ref().and_then(|e| e.plant.as_ref());
-            let original = found
-                .map(|found| {
-                    let simulated = simulated(found, file, asked.roles, say)?;
-                    found
-                        .original(&log, &simulated, hold)
-                        .map_err(|e| anyhow::anyhow!("{}: {e}", file.display()))
-                })
-                .transpose()?
-                .flatten();
-            if original.is_none() {
-                anyhow::bail!(
-                    "{}: --simulation belongs to an explanation of simulated columns, and this plant was given as equations; leave \
-                     it out",
-                    asked.plant.display()
-                );
-            }
-            original
-        }
-        None => None,
-    };
-    if let (Some(original), Start::Text) = (&beside, &asked.start) {
+    if matches!(asked.start, Start::Text) {
         set_start(&plant, &mut point, &original.start)?;
     }
-    let mut run = plant
+    let mut outputs = plant
         .run(&log, &point, hold)
-        .map_err(|e| anyhow::anyhow!("{}: {e}", asked.plant.display()))?;
-    if let Some(original) = &beside {
-        for (y, rest) in run.outputs.iter_mut().zip(&original.remainder) {
-            y.iter_mut().zip(rest).for_each(|(y, rest)| *y += rest);
-        }
-    }
+        .map_err(|e| anyhow::anyhow!("{}: {e}", asked.plant.display()))?
+        .outputs;
+    original.add_remainder(&mut outputs);
     let declared = plant.spec.outputs().into_iter().map(|v| Channel {
         name: plant.spec.variable(v).column().to_owned(),
         unit: plant.spec.variable(v).unit_text.clone(),
@@ -158,7 +153,7 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
     let named: Vec<Channel> = found.map_or_else(|| declared.collect(), |p| p.outputs);
     let columns: Vec<(&Channel, &[f64])> = named
         .iter()
-        .zip(run.outputs.iter().map(Vec::as_slice))
+        .zip(outputs.iter().map(Vec::as_slice))
         .collect();
     write_table(asked.output, log.sample_time, log.start_time, &columns)?;
     Ok(Outcome::Done)

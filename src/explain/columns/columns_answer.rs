@@ -48,10 +48,7 @@ pub(crate) fn explain_equations(
             y.iter_mut().zip(rest).for_each(|(y, rest)| *y -= rest);
         }
     }
-    let recordings = logs
-        .iter()
-        .map(|log| Recording::of_log(log, None))
-        .collect();
+    let (logs, recordings) = logs_with_recordings(logs.into_iter());
     let options = PlantOptions {
         hold: found.hold,
         // Effects that only linear simulators have are not tried here.
@@ -72,6 +69,15 @@ pub(crate) fn explain_equations(
         plant.simulation = Some(found.plant.spec.text.clone());
     }
     Some(explanation)
+}
+
+/// Logs, and how a document refers to them.
+pub(super) fn logs_with_recordings(logs: impl Iterator<Item = Log>) -> (Vec<Log>, Vec<Recording>) {
+    logs.map(|log| {
+        let recording = Recording::of_log(&log, None);
+        (log, recording)
+    })
+    .unzip()
 }
 
 /// Root mean square of recorded less simulated.

@@ -6,19 +6,25 @@
 //! ([`chain`]), whose coefficients are fitted to the simulated outputs in free run, and coefficients that change them by less
 //! than a hundredth of what the recording differs from the simulation are dropped. What is known of a plant in equations then holds
 //! for columns too. What the equations miss of the simulated outputs is subtracted from the recorded ones.
+//!
+//! What a sensor does to the outputs needs no equations of what is before it ([`simulator_outputs`]).
 
 mod chain;
+mod column;
 mod columns_answer;
 mod drop_coefficients;
 mod filtered_signals;
 mod regression;
+mod simulator_outputs;
 
 pub(crate) use columns_answer::{equations, explain_equations};
+pub(crate) use simulator_outputs::explain_sensors;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use self::chain::{Chains, Column};
+use self::chain::Chains;
+use self::column::Column;
 use self::drop_coefficients::eliminate;
 use self::filtered_signals::{Regressors, Signals};
 use self::regression::{OutputEquation, output_equation};

@@ -1,54 +1,32 @@
 //! What is known of the simulation, and the recordings prepared to be compared with it.
 
-use std::sync::Arc;
-
 use super::check::{Checked, INTERPOLATION, between};
-use super::data::{Data, Segment, Series, delayed};
-use super::fit::{Effort, Fit, Problem};
-use super::identification::autoregression::{Simulator, identify_simulator};
+use super::data::{Data, Segment, delayed};
+use super::identification::autoregression::{Simulator as Identified, identify_simulator};
 use super::identification::minimal_order::{Simplest, simplest};
 use super::identification::simulator_offset::operating_point;
 use super::identification::step_response_test::Uncertainty;
+use super::known::Known;
 use super::model::coordinates::Coordinates;
 use super::model::linear_plant::Plant;
 use super::model::structure::Structure;
 use super::model::structure::without_effects::bare;
-use super::model::time_stepping::MOST_STATES;
-use super::search::null_models::Boring;
-use super::search::single_effects::single_effects;
+use super::nonlinear_simulator::NonlinearSimulator;
 use crate::explain::document::explain_error::ExplainError;
-use crate::explain::effects::{Action, Definition};
 use crate::explain::simulation::Simulation;
 use crate::identify::Model;
-use crate::linalg::spectral_radius;
 use crate::log::{Channel, LARGEST_SIZE, Log};
-use crate::noise::Colours;
 
-/// The simulation as the engine knows it, beside the data in the form that it is compared with.
+/// What a simulation turns out to be.
 #[derive(Debug, Clone)]
-pub(crate) struct Known {
-    pub(crate) data: Data,
-    /// Plant and effects that the simulation holds, all numbers fixed.
-    pub(crate) structure: Structure,
-    /// Delay of each input in samples, applied to `data` already.
-    pub(crate) delays: Vec<usize>,
-    /// The simulator is not linear and known by its outputs only: `data` is relative to what `structure` misses.
-    pub(crate) relative: bool,
-    /// The simulation is a model that was identified from a recording.
-    pub(crate) identified: bool,
-    /// How well it is known, if it says so.
-    pub(crate) uncertainty: Option<Uncertainty>,
+pub(crate) enum Simulator {
+    Linear(Box<Known>),
+    /// Known by its outputs, which no linear model reproduces.
+    Nonlinear(Box<NonlinearSimulator>),
 }
 
-/// Samples that a state needs, so that blocks can be held out.
-const SAMPLES_A_STATE: usize = 40;
-/// Least samples at all.
-const LEAST_SAMPLES: usize = 150;
-/// A simulated output that no model explains better than this is not a simulation of these inputs.
-const UNDERSTOOD: f64 = 0.5;
-
 /// Checks and prepares everything.
-pub(crate) fn know(checked: &Checked) -> Result<Known, ExplainError> {
+pub(crate) fn know(checked: &Checked) -> Result<Simulator, ExplainError> {
     let (recordings, simulation) = (checked.recordings.as_slice(), &checked.simulation);
     let first = recordings.first().ok_or(ExplainError::NoRecording)?;
     for log in recordings {
@@ -71,8 +49,10 @@ pub(crate) fn know(checked: &Checked) -> Result<Known, ExplainError> {
         }
     }
     recordings.iter().try_for_each(check_sizes)?;
-    let known = match simulation {
-        Simulation::Model(model, name) => of_model(recordings, model, name)?,
+    let simulator = match simulation {
+        Simulation::Model(model, name) => {
+            Simulator::Linear(Box::new(of_model(recordings, model, name)?))
+        }
         Simulation::Outputs(logs) => {
             logs.iter().try_for_each(Log::check)?;
             logs.iter().try_for_each(check_sizes)?;
@@ -80,35 +60,10 @@ pub(crate) fn know(checked: &Checked) -> Result<Known, ExplainError> {
             of_outputs(recordings, logs, checked.interpolated)?
         }
     };
-    let states = known.structure.states();
-    if states > MOST_STATES {
-        return Err(ExplainError::TooLarge {
-            name: simulation_name(simulation),
-            states,
-            most: MOST_STATES,
-        });
+    if let Simulator::Linear(known) = &simulator {
+        known.check(checked)?;
     }
-    let needed = LEAST_SAMPLES.max(SAMPLES_A_STATE * states);
-    if known.data.samples() < needed {
-        return Err(ExplainError::TooShort {
-            recording: first.name.clone(),
-            samples: known.data.samples(),
-            needed,
-            states,
-        });
-    }
-    if known
-        .structure
-        .simulate(&known.structure.given(), &known.data)
-        .is_none()
-    {
-        return Err(ExplainError::Unstable {
-            name: simulation_name(simulation),
-            radius: spectral_radius(&known.structure.coordinates.given.a_matrix())
-                .unwrap_or(f64::NAN),
-        });
-    }
-    Ok(known)
+    Ok(simulator)
 }
 
 /// Refuses channels so large or so small that their squares and products leave the range of numbers. A channel that does
@@ -136,13 +91,6 @@ fn check_sizes(log: &Log) -> Result<(), ExplainError> {
 /// "1 input", "2 inputs".
 fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
-}
-
-fn simulation_name(simulation: &Simulation) -> String {
-    match simulation {
-        Simulation::Model(_, name) => name.clone(),
-        Simulation::Outputs(logs) => logs.first().map_or_else(String::new, |l| l.name.clone()),
-    }
 }
 
 fn of_model(recordings: &[Log], model: &Model, name: &str) -> Result<Known, ExplainError> {
@@ -343,8 +291,22 @@ fn check_outputs(recordings: &[Log], logs: &[Log]) -> Result<(), ExplainError> {
     Ok(())
 }
 
-fn of_outputs(recordings: &[Log], logs: &[Log], interpolated: bool) -> Result<Known, ExplainError> {
+fn of_outputs(
+    recordings: &[Log],
+    logs: &[Log],
+    interpolated: bool,
+) -> Result<Simulator, ExplainError> {
     let delays = vec![0; recordings[0].inputs.len()];
+    let linear = |structure: Structure, data: Data| {
+        Simulator::Linear(Box::new(Known {
+            structure,
+            data,
+            delays: delays.clone(),
+            relative: false,
+            identified: false,
+            uncertainty: None,
+        }))
+    };
     let data = data_of(recordings, &delays);
     let mut noise_free = data.clone();
     for (segment, log) in noise_free.segments.iter_mut().zip(logs) {
@@ -361,14 +323,7 @@ fn of_outputs(recordings: &[Log], logs: &[Log], interpolated: bool) -> Result<Kn
         if let Some(level) = level {
             add_constant(&mut data, &mut plant, &vec![0.0; delays.len()], &level);
         }
-        return Ok(Known {
-            structure: bare(&plant, &initial),
-            data,
-            delays,
-            relative: false,
-            identified: false,
-            uncertainty: None,
-        });
+        return Ok(linear(bare(&plant, &initial), data));
     }
     let simulator = identify_simulator(&noise_free).ok_or_else(|| ExplainError::NotUnderstood {
         name: name(),
@@ -376,22 +331,18 @@ fn of_outputs(recordings: &[Log], logs: &[Log], interpolated: bool) -> Result<Kn
     })?;
     let structure = bare(&simulator.plant, &simulator.initial);
     if simulator.is_linear() || interpolated && simulator.misfit < INTERPOLATION {
-        return Ok(Known {
-            data,
-            structure,
-            delays,
-            relative: false,
-            identified: false,
-            uncertainty: None,
-        });
+        return Ok(linear(structure, data));
     }
     if let Some(known) = about_a_level(&data, &noise_free, &delays) {
-        return Ok(known);
+        return Ok(Simulator::Linear(Box::new(known)));
     }
-    learn_nonlinear(data, &noise_free, &structure, &simulator).ok_or(ExplainError::NotUnderstood {
+    Ok(Simulator::Nonlinear(Box::new(NonlinearSimulator {
         name: name(),
+        data,
+        noise_free,
+        structure,
         misfit: simulator.misfit,
-    })
+    })))
 }
 
 /// A simulator that is linear about an operating point.
@@ -405,7 +356,7 @@ fn about_a_level(data: &Data, noise_free: &Data, delays: &[usize]) -> Option<Kno
             }
         }
     }
-    let mut simulator = identify_simulator(&about).filter(Simulator::is_linear)?;
+    let mut simulator = identify_simulator(&about).filter(Identified::is_linear)?;
     let mut data = data.clone();
     let rest = vec![0.0; data.inputs];
     add_constant(&mut data, &mut simulator.plant, &rest, &level);
@@ -414,81 +365,6 @@ fn about_a_level(data: &Data, noise_free: &Data, delays: &[usize]) -> Option<Kno
         data,
         delays: delays.to_vec(),
         relative: false,
-        identified: false,
-        uncertainty: None,
-    })
-}
-
-/// The effect that a nonlinear simulator holds, learnt from its noise-free outputs. What is missed even so is taken off
-/// the recording, so that it cancels.
-fn learn_nonlinear(
-    mut data: Data,
-    noise_free: &Data,
-    structure: &Structure,
-    simulator: &Simulator,
-) -> Option<Known> {
-    let mut problem = Problem::new(noise_free);
-    problem.colours = Colours::White;
-    let boring = Boring::fit(&problem, structure, None)?;
-    let physical = |d: &Definition| {
-        d.persists
-            && matches!(
-                d.action,
-                Action::Force(..) | Action::Input(_) | Action::Sensor(_)
-            )
-    };
-    let ranked = single_effects(&problem, &boring, &physical);
-    let best = ranked.into_iter().next()?.fit;
-    let best = Fit::run(
-        &problem,
-        best.structure.clone(),
-        best.theta.clone(),
-        Some(&best.noise),
-        Effort::FINAL,
-    )
-    .unwrap_or(best);
-    let fitted = &best.structure;
-    let initial: Vec<Vec<f64>> = (0..noise_free.segments.len())
-        .map(|s| fitted.initial_state(&best.theta, s).to_vec())
-        .collect();
-    let coordinates = fitted.coordinates.around(fitted.plant(&best.theta));
-    let structure = Structure {
-        coordinates: Arc::new(coordinates),
-        plant_free: false,
-        initial_free: false,
-        feedthrough_free: false,
-        substeps: 1,
-        recording: None,
-        initial,
-        known: (0..fitted.effects.len())
-            .map(|i| fitted.effect_numbers(&best.theta, i).to_vec())
-            .collect(),
-        adjusted: 0,
-        ..fitted.clone()
-    };
-    let missed: Series = noise_free.residual(&structure.simulate(&[], noise_free)?);
-    let size: f64 = missed.iter().flatten().map(|v| v * v).sum();
-    let there: f64 = noise_free
-        .outputs_as_series()
-        .flatten()
-        .map(|v| v * v)
-        .sum();
-    if size > UNDERSTOOD * UNDERSTOOD * there && simulator.misfit > UNDERSTOOD {
-        return None;
-    }
-    let l = data.outputs;
-    for (s, segment) in data.segments.iter_mut().enumerate() {
-        for (o, y) in segment.outputs.iter_mut().enumerate() {
-            for (y, missed) in y.iter_mut().zip(&missed[s * l + o]) {
-                *y -= missed;
-            }
-        }
-    }
-    Some(Known {
-        delays: vec![0; data.inputs],
-        data,
-        structure,
-        relative: true,
         identified: false,
         uncertainty: None,
     })

@@ -13,7 +13,9 @@
 //! | `check` | data quality: dropouts, outliers, wraps, clocks, signs, units, exchanged outputs, a stuck sensor |
 //! | `screening` | score tests of all effects at all places; tests of the residual |
 //! | `search` | null models, fits of effects, forward selection, cross-validation, penalties |
-//! | `known_simulation` | what is known of the simulation, and the recordings as they are compared with it |
+//! | `known` | the simulation as the engine knows it, and the recordings as they are compared with it |
+//! | `nonlinear_simulator` | a nonlinear simulator that is known by its outputs: the effect that it holds |
+//! | `known_simulation` | checks of a simulation, and whether it is linear |
 //! | `weak_form` | drives: the equation of motion averaged over windows |
 //! | `decision` | the verdict, by output error and by the averaged equation of motion |
 //! | `augmented` | the augmented model of a document: its simulation, its initial state |
@@ -30,8 +32,10 @@ pub(crate) mod fit;
 #[cfg(test)]
 pub(crate) mod fixtures;
 pub(crate) mod identification;
+pub(crate) mod known;
 pub(crate) mod known_simulation;
 pub(crate) mod model;
+pub(crate) mod nonlinear_simulator;
 pub(crate) mod screening;
 pub(crate) mod search;
 pub(crate) mod weak_form;

@@ -325,6 +325,7 @@ impl Answer<'_> {
                     .text_at(&self.whole.points(&self.found.fit)[0]),
                 outputs: self.channels.clone(),
                 simulation: None,
+                simulated_inputs: vec![],
                 times_of_change: self.times_of_change(),
                 hold: if self.hold == Hold::Zero {
                     "zero"

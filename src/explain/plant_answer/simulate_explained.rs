@@ -19,6 +19,12 @@ pub enum AugmentedPlantError {
          answer to exactly this input"
     )]
     Simulation { needed: usize, found: usize },
+    /// Equations that need the original simulator's answer.
+    #[error(
+        "its sensors measure {}, the outputs of the simulation that was explained: give that simulator's answer to this input",
+        .inputs.join(", ")
+    )]
+    NeedsSimulation { inputs: Vec<String> },
     /// The start of the original simulator cannot be found.
     #[error(transparent)]
     Start(#[from] EstimateError),
@@ -27,12 +33,14 @@ pub enum AugmentedPlantError {
     Equations(#[from] SimulationError),
 }
 
-/// The equations of a simulator beside its answer to an input.
-#[derive(Debug, Clone, PartialEq)]
+/// What the answer of the original simulator to an input tells an explained plant.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Original {
+    /// Further inputs: the answer itself, where sensors are explained.
+    pub inputs: Vec<Vec<f64>>,
     /// Where its states start.
     pub start: Vec<(String, f64)>,
-    /// Simulated outputs less those of the equations.
+    /// Simulated outputs less those of the equations; none where the answer is an input.
     pub remainder: Vec<Vec<f64>>,
 }
 
@@ -52,26 +60,46 @@ impl AugmentedPlant {
         }
     }
 
-    /// Finds where the simulator started that was known by its columns, and what its equations miss of its answer to the inputs
-    /// of `log`; none where the simulation was given as equations.
+    /// What is known of a simulator that was known by its columns from its answer to the inputs of `log`: where it started, and what
+    /// its equations miss; or the inputs that its answer is. None where the simulation was given as equations, or no answer is
+    /// given or needed.
     ///
     /// # Errors
     /// [`AugmentedPlantError`]: a damaged explanation, columns that do not fit, equations that cannot be simulated.
     pub fn original(
         &self,
         log: &Log,
-        simulated: &[Vec<f64>],
+        simulated: Option<&[Vec<f64>]>,
         hold: Hold,
     ) -> Result<Option<Original>, AugmentedPlantError> {
+        let Some(simulated) = simulated else {
+            return match self.simulated_inputs.is_empty() {
+                true => Ok(None),
+                false => Err(AugmentedPlantError::NeedsSimulation {
+                    inputs: self.simulated_inputs.clone(),
+                }),
+            };
+        };
+        let fits = simulated.iter().filter(|y| y.len() == log.samples());
+        let (needed, found) = (self.outputs.len(), fits.count());
+        let fit = found == needed && simulated.len() == needed;
+        let wrong = || AugmentedPlantError::Simulation { needed, found };
+        if !self.simulated_inputs.is_empty() {
+            return match fit {
+                true => Ok(Some(Original {
+                    inputs: simulated.to_vec(),
+                    ..Original::default()
+                })),
+                false => Err(wrong()),
+            };
+        }
         let Some(text) = &self.simulation else {
             return Ok(None);
         };
-        let plant = plant_of(text)?;
-        let fits = simulated.iter().filter(|y| y.len() == log.samples());
-        let (needed, found) = (plant.spec.outputs().len(), fits.count());
-        if found != needed || simulated.len() != needed {
-            return Err(AugmentedPlantError::Simulation { needed, found });
+        if !fit {
+            return Err(wrong());
         }
+        let plant = plant_of(text)?;
         let recording = PlantRecording {
             outputs: simulated.to_vec(),
             ..PlantRecording::from(log)
@@ -89,6 +117,7 @@ impl AugmentedPlant {
         let own = plant.run(log, point, hold)?.outputs;
         let states = plant.spec.states().into_iter().zip(&point.start);
         Ok(Some(Original {
+            inputs: vec![],
             start: states
                 .filter_map(|(v, start)| Some((plant.spec.variable(v).name.clone(), (*start)?)))
                 .collect(),
@@ -118,21 +147,25 @@ impl AugmentedPlant {
                 *value = log.start_time - log.sample_time;
             }
         }
-        let original = match simulated {
-            Some(simulated) => self.original(log, simulated, self.hold())?,
-            None => None,
-        };
-        let Some(original) = original else {
-            return Ok(plant.run(log, &point, self.hold())?.outputs);
-        };
+        let original = self.original(log, simulated, self.hold())?;
+        let original = original.unwrap_or_default();
         for (start, v) in point.start.iter_mut().zip(plant.spec.states()) {
             let known = original.start.iter().find(|(name, _)| name == named(v));
             *start = known.map_or(*start, |(_, value)| Some(*value));
         }
-        let mut outputs = plant.run(log, &point, self.hold())?.outputs;
-        for (y, rest) in outputs.iter_mut().zip(&original.remainder) {
+        let mut log = log.clone();
+        log.input_data.extend(original.inputs.iter().cloned());
+        let mut outputs = plant.run(&log, &point, self.hold())?.outputs;
+        original.add_remainder(&mut outputs);
+        Ok(outputs)
+    }
+}
+
+impl Original {
+    /// Adds what the equations miss to their outputs.
+    pub fn add_remainder(&self, outputs: &mut [Vec<f64>]) {
+        for (y, rest) in outputs.iter_mut().zip(&self.remainder) {
             y.iter_mut().zip(rest).for_each(|(y, rest)| *y += rest);
         }
-        Ok(outputs)
     }
 }

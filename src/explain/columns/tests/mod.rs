@@ -7,7 +7,7 @@ use rand_distr::StandardNormal;
 use super::*;
 use crate::explain::linear::check::Checked;
 use crate::explain::simulation::Simulation;
-use crate::explain::{Explanation, Verdict};
+use crate::explain::{AugmentedPlantError, Explanation, Verdict};
 use crate::log::Log;
 use crate::physics::{Excitation, Point};
 
@@ -111,26 +111,34 @@ fn of_equivalent_orders_those_with_the_fewest_terms_are_taken() {
     assert!(text.contains("ic = ic_state"), "{text}");
 }
 
-/// What is said of a pendulum that differs from its simulation by a parameter.
-fn answer(change: &dyn Fn(&mut Point)) -> Explanation {
-    let (u, h) = (steps(25), 0.05);
-    let log = |outputs: Vec<Vec<f64>>| Log {
+fn log(u: &[f64], outputs: Vec<Vec<f64>>, sample_time: f64) -> Log {
+    Log {
         name: "log".to_owned(),
-        sample_time: h,
+        sample_time,
         start_time: 0.0,
         inputs: vec![channel("u")],
         outputs: vec![channel("y")],
-        input_data: vec![u.clone()],
+        input_data: vec![u.to_vec()],
         output_data: outputs,
         sha256: None,
-    };
-    let known = Simulation::Outputs(vec![log(run(PENDULUM, |_| {}, &u, h))]);
-    let mut recorded = run(PENDULUM, change, &u, h);
+    }
+}
+
+/// A recording of a pendulum that differs from its simulation by a parameter, and the simulation.
+fn differing(change: &dyn Fn(&mut Point)) -> (Log, Log) {
+    let (u, h) = (steps(25), 0.05);
+    let mut recorded = log(&u, run(PENDULUM, change, &u, h), h);
     let mut random = ChaCha8Rng::seed_from_u64(1);
-    for y in &mut recorded[0] {
+    for y in &mut recorded.output_data[0] {
         *y += 0.003 * random.sample::<f64, _>(StandardNormal);
     }
-    let checked = Checked::new(&[log(recorded)], &known, &|_| true);
+    (recorded, log(&u, run(PENDULUM, |_| {}, &u, h), h))
+}
+
+fn answer(change: &dyn Fn(&mut Point)) -> Explanation {
+    let (recorded, simulated) = differing(change);
+    let known = Simulation::Outputs(vec![simulated]);
+    let checked = Checked::new(&[recorded], &known, &|_| true);
     explain_equations(&equations(&checked).unwrap(), &checked, &[]).unwrap()
 }
 
@@ -148,4 +156,63 @@ fn what_acts_in_the_recording_is_named_and_a_changed_parameter_is_not() {
     assert!(plant.simulation.unwrap().contains("sin(y_state)"));
     let softer = answer(&|p| p.parameters[1] = 8.0);
     assert_eq!(softer.verdict, Verdict::Parameters, "{:?}", softer.summary);
+}
+
+/// A recording with a sensor that lags behind a pendulum by 0.12 s.
+fn lagging() -> (Log, Log) {
+    let slow = PENDULUM.replace("c = 0.0;", "c = 0.12; Real s(start=0.2);");
+    let slow = slow
+        .replace("- c*w*abs(w)", "")
+        .replace("y = phi", "c*der(s) = phi - s; y = s");
+    let (u, h) = (steps(25), 0.05);
+    let mut recorded = log(&u, run(&slow, |_| {}, &u, h), h);
+    let mut random = ChaCha8Rng::seed_from_u64(2);
+    for y in &mut recorded.output_data[0] {
+        *y += 0.003 * random.sample::<f64, _>(StandardNormal);
+    }
+    (recorded, log(&u, run(PENDULUM, |_| {}, &u, h), h))
+}
+
+#[test]
+fn a_sensor_is_named_without_equations_of_what_it_measures() {
+    let (recorded, simulated) = lagging();
+    let known = Simulation::Outputs(vec![simulated.clone()]);
+    let checked = Checked::new(std::slice::from_ref(&recorded), &known, &|_| true);
+    let found = explain_sensors(&checked, &[]).unwrap();
+    assert_eq!(found.effects[0].effect, "sensor_lag", "{:?}", found.summary);
+    let tau = found.effects[0].parameters.values().next().unwrap();
+    assert!((tau.value - 0.12).abs() < 4.0 * tau.std.unwrap(), "{tau:?}");
+
+    // It runs beside the simulator only.
+    let plant = found.plant.unwrap();
+    assert_eq!(plant.simulated_inputs, ["y_simulated"]);
+    assert!(matches!(
+        plant.simulate(&recorded, None),
+        Err(AugmentedPlantError::NeedsSimulation { .. })
+    ));
+    let short = vec![simulated.output_data[0][1..].to_vec()];
+    assert!(matches!(
+        plant.simulate(&recorded, Some(&short)),
+        Err(AugmentedPlantError::Simulation {
+            needed: 1,
+            found: 0
+        })
+    ));
+    let error = |y: &[Vec<f64>]| {
+        let pairs = y[0].iter().zip(&recorded.output_data[0]);
+        pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    };
+    let run = plant
+        .simulate(&recorded, Some(&simulated.output_data))
+        .unwrap();
+    assert!(error(&run) < 0.1 * error(&simulated.output_data));
+}
+
+#[test]
+fn what_acts_inside_is_no_sensor() {
+    let (recorded, simulated) = differing(&|p| p.parameters[2] = 0.3);
+    let known = Simulation::Outputs(vec![simulated]);
+    let checked = Checked::new(&[recorded], &known, &|_| true);
+    let sensors = explain_sensors(&checked, &[]);
+    assert!(sensors.is_none(), "{:?}", sensors.map(|s| s.summary));
 }

@@ -261,8 +261,9 @@ fn substituted(text: &str, part: Span, mut pieces: Vec<(Span, String)>) -> Strin
     out
 }
 
-/// Where effects may enter: every equation that is no definition (of a rate, of a stretch) and no plain sensor, every input, and
-/// every parameter but times of delays; of all these what the given plant has, not what effects have added to it.
+/// Where effects may enter: every equation that is no definition (of a rate, of a stretch) and no plain sensor, every input that
+/// more than a sensor sees, and every parameter but times of delays; of all these what the given plant has, not what effects have
+/// added to it.
 pub(crate) fn places(spec: &ModelSpec, given: &ModelSpec) -> Vec<Place> {
     let mut found = Vec::new();
     let own = given.parameters().len();
@@ -279,7 +280,9 @@ pub(crate) fn places(spec: &ModelSpec, given: &ModelSpec) -> Vec<Place> {
     found.extend(
         spec.inputs()
             .into_iter()
-            .filter(|&v| !uses(spec, v).is_empty())
+            .filter(|&v| {
+                !uses(spec, v).is_empty() && !is_only_measured(given, &spec.variable(v).name)
+            })
             .map(Place::Input),
     );
     let parameters = spec.parameters().into_iter().take(own);
@@ -289,6 +292,17 @@ pub(crate) fn places(spec: &ModelSpec, given: &ModelSpec) -> Vec<Place> {
             .map(Place::Parameter),
     );
     found
+}
+
+/// Whether outputs copy an input, and no equation uses it: what happens to it happens in the sensor.
+fn is_only_measured(given: &ModelSpec, input: &str) -> bool {
+    given.find(input).is_some_and(|v| {
+        let copies = given.equations.iter().filter(|e| {
+            let output = given.variable(e.unknown.variable()).output;
+            output && e.coefficient.is_none() && given.expressions.node(e.rest) == Node::Variable(v)
+        });
+        copies.count() == uses(given, v).len()
+    })
 }
 
 /// Whether a variable is one of the plant that was given.
@@ -420,6 +434,19 @@ end Tank;
         for name in ["a", "x", "y"] {
             assert!(!names.contains(&name), "{name} of {names:?}");
         }
+    }
+
+    #[test]
+    fn what_only_sensors_see_is_no_place() {
+        let spec = parse("model M input Real u; input Real s; output Real y; output Real z; equation y = s; z = s + u; end M;").unwrap();
+        let all = |spec: &ModelSpec| -> Vec<String> {
+            let names = places(spec, spec);
+            let name = |p: &Place| spec.variable(p.variable(spec)).name.clone();
+            names.iter().map(name).collect()
+        };
+        assert_eq!(all(&spec), ["z", "u", "s"]);
+        let measured = parse("model M input Real s; output Real y; equation y = s; end M;");
+        assert!(all(&measured.unwrap()).is_empty());
     }
 
     #[test]

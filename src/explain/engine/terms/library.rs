@@ -456,3 +456,8 @@ pub(crate) const TERMS: &[Term] = &[
         units: &[],
     },
 ];
+
+/// Ids of the effects of sensors.
+pub(crate) fn sensor_effects() -> impl Iterator<Item = &'static str> {
+    TERMS.iter().filter(|t| t.port == Sensor).map(|t| t.id)
+}

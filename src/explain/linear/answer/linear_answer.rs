@@ -14,7 +14,7 @@ use crate::explain::linear::check::same_factor;
 use crate::explain::linear::data::{Data, Series};
 use crate::explain::linear::decision::output_error_decision::Finding;
 use crate::explain::linear::fit::{Fit, Problem};
-use crate::explain::linear::known_simulation::Known;
+use crate::explain::linear::known::Known;
 use crate::explain::linear::screening::output_adequacy::adequacy;
 use crate::explain::linear::search::cross_validation;
 use crate::explain::linear::search::penalties::NEEDED;

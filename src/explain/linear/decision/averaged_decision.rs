@@ -6,7 +6,7 @@ use crate::explain::explanation::Verdict;
 use crate::explain::linear::data::{Data, Segment, delayed};
 use crate::explain::linear::fit::{Fit, Problem};
 use crate::explain::linear::identification::autoregression::initial_states;
-use crate::explain::linear::known_simulation::Known;
+use crate::explain::linear::known::Known;
 use crate::explain::linear::model::linear_plant::Plant;
 use crate::explain::linear::model::structure::without_effects::bare;
 use crate::explain::linear::search::cross_validation;

@@ -6,7 +6,7 @@ use crate::explain::linear::check::coarse_sensor;
 use crate::explain::linear::check::{Freeze, Trouble, frozen};
 use crate::explain::linear::data::{Data, difference};
 use crate::explain::linear::fit::{Effort, Fit, Problem};
-use crate::explain::linear::known_simulation::Known;
+use crate::explain::linear::known::Known;
 use crate::explain::linear::model::structure::Structure;
 use crate::explain::linear::screening::output_adequacy::{Adequacy, adequacy};
 use crate::explain::linear::search::forward_selection::{

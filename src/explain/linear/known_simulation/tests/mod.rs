@@ -38,13 +38,15 @@ fn a_model_simulates_about_its_operating_points() {
     let inputs: Vec<&[f64]> = about.input_data.iter().map(Vec::as_slice).collect();
     let expected = model.system.simulate(&inputs, None).unwrap();
     let simulation = Simulation::Model(Box::new(model), "model".to_owned());
-    let known = know(&Checked {
+    let simulator = know(&Checked {
         recordings: vec![log],
         simulation,
         troubles: Vec::new(),
         interpolated: false,
-    })
-    .unwrap();
+    });
+    let Ok(Simulator::Linear(known)) = simulator else {
+        panic!("{simulator:?}");
+    };
     let theta = known.structure.given();
     let found = known.structure.simulate(&theta, &known.data).unwrap();
     for ((found, expected), level) in found.iter().zip(&expected).zip(y0) {
