@@ -150,7 +150,13 @@ fn explain_nonlinear(
         return Ok(sensors);
     }
     Ok(match by_equations() {
-        Some(equations) if stands_in(&equations, &explanation) => equations,
+        Some(mut equations) if stands_in(&equations, &explanation) => {
+            // What rough equations leave may be their own error, and a name beside it stand for that.
+            if !equations.remaining.adequate {
+                doubt(&mut equations);
+            }
+            equations
+        }
         Some(equations) if agree(&equations, &explanation) => explanation,
         _ => {
             doubt(&mut explanation);

@@ -138,26 +138,25 @@ pub(crate) fn read_recordings(
     need: RoleNeed,
     say: Verbosity,
 ) -> anyhow::Result<(Vec<Log>, Vec<Recording>)> {
-    read_channels(plant, channels(plant), sources, flags, need, say)
+    read_channels(&channels(plant), sources, flags, need, say)
 }
 
 /// Reads these channels of a plant; one with gaps is several.
 pub(super) fn read_channels(
-    plant: &Plant,
-    (inputs, outputs): (Vec<IdentifiedChannel>, Vec<IdentifiedChannel>),
+    (inputs, outputs): &(Vec<IdentifiedChannel>, Vec<IdentifiedChannel>),
     sources: &[Source],
     flags: &RoleFlags,
     need: RoleNeed,
     say: Verbosity,
 ) -> anyhow::Result<(Vec<Log>, Vec<Recording>)> {
-    let roles: Roles = flags.clone().of_model(&inputs, &outputs)?;
+    let roles: Roles = flags.clone().of_model(inputs, outputs)?;
     let need = if inputs.is_empty() {
         RoleNeed::OutputsOnly
     } else {
         need
     };
     read_with(&roles, sources, need, say).map_err(|e| match e.downcast::<LogError>() {
-        Ok(of_names) => other_names(of_names, plant),
+        Ok(of_names) => other_names(of_names, inputs, outputs),
         Err(other) => other,
     })
 }
@@ -189,25 +188,19 @@ pub(crate) fn read_with(
 }
 
 /// An error of reading, with the way to read a recording that has other names than the plant.
-fn other_names(error: LogError, plant: &Plant) -> anyhow::Error {
+fn other_names(
+    error: LogError,
+    inputs: &[IdentifiedChannel],
+    outputs: &[IdentifiedChannel],
+) -> anyhow::Error {
     if !matches!(error, LogError::UnknownColumn { .. }) {
         return error.into();
     }
-    let spec = &plant.spec;
-    let flag = |flag: &str, variables: Vec<VariableId>| {
-        let names: Vec<&str> = variables
-            .iter()
-            .map(|&v| spec.variable(v).column())
-            .collect();
-        match names.as_slice() {
-            [] => None,
-            names => Some(format!("`{flag}` for {}", names.join(", "))),
-        }
+    let flag = |flag: &str, channels: &[IdentifiedChannel]| {
+        let names: Vec<&str> = channels.iter().map(|c| c.channel.name.as_str()).collect();
+        (!names.is_empty()).then(|| format!("`{flag}` for {}", names.join(", ")))
     };
-    let flags = [
-        flag("--inputs", spec.inputs()),
-        flag("--outputs", spec.outputs()),
-    ];
+    let flags = [flag("--inputs", inputs), flag("--outputs", outputs)];
     let flags: Vec<String> = flags.into_iter().flatten().collect();
     anyhow::anyhow!(
         "{error}; where the file has other names than the plant, list its columns with {}, in this order",

@@ -64,11 +64,12 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         RoleNeed::InputsOnly
     };
     let found = explanation.as_ref().and_then(|e| e.plant.as_ref());
-    let (mut inputs, outputs) = channels(&plant);
-    inputs.retain(|i| found.is_none_or(|f| !f.simulated_inputs.contains(&i.channel.name)));
+    let mut columns = channels(&plant);
+    columns
+        .0
+        .retain(|i| found.is_none_or(|f| !f.simulated_inputs.contains(&i.channel.name)));
     let (mut logs, _) = read_channels(
-        &plant,
-        (inputs, outputs),
+        &columns,
         std::slice::from_ref(asked.input),
         asked.roles,
         need,

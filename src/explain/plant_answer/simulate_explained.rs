@@ -21,7 +21,8 @@ pub enum AugmentedPlantError {
     Simulation { needed: usize, found: usize },
     /// Equations that need the original simulator's answer.
     #[error(
-        "its sensors measure {}, the outputs of the simulation that was explained: give that simulator's answer to this input",
+        "its sensors measure {}, the outputs of the simulation that was explained: give that simulator's answer to this input with --simulation \
+         FILE.csv",
         .inputs.join(", ")
     )]
     NeedsSimulation { inputs: Vec<String> },
