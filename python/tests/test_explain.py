@@ -109,7 +109,7 @@ def test_a_sensor_is_found_whatever_the_simulator_is():
     simulation = found.simulate(new)
     assert np.sqrt(np.mean((np.ravel(simulation) - np.minimum(logarithmic(new), 1.0)) ** 2)) < 0.01
     restored = pickle.loads(pickle.dumps(found))
-    with pytest.raises(innovant.InnovantError, match="y_simulated; give the simulator's answer"):
+    with pytest.raises(innovant.InnovantError, match="y1_simulated; give the simulator's answer"):
         restored.simulate(new)
     assert np.array_equal(restored.simulate(new, simulation=logarithmic(new)), simulation)
 
