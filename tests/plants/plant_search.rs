@@ -243,3 +243,65 @@ fn a_characteristic_that_nobody_listed_is_found_at_its_input() {
     let cosine = dot / (size(&found) * size(&wanted));
     assert!(cosine > 0.95, "{cosine}: {at:?}\n{found:?}\n{wanted:?}");
 }
+
+const DRIVE: &str = r#"model Drive "turntable"
+  parameter Real T(unit="s", min=0.8, max=1.2) = 1 "time constant";
+  parameter Real K(min=0.8, max=1.2) = 1 "gain";
+  input Real u(unit="rad/s");
+  output Real angle(unit="rad");
+  output Real rate(unit="rad/s");
+  Real a(unit="rad", start=0);
+  Real w(unit="rad/s", start=0);
+equation
+  der(a) = w;
+  T*der(w) = K*u - w;
+  angle = a;
+  rate = w;
+end Drive;
+"#;
+
+/// The first effect that is found in a recording of the drive, whose true angle and rate `sensors` reads at 0.05 s a sample.
+fn effect_of_drive(sensors: impl Fn(&[[f64; 2]]) -> [f64; 2]) -> Value {
+    let folder = Folder::new();
+    folder.text("drive.mo", DRIVE);
+    let mut dice = ChaCha8Rng::seed_from_u64(5);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut dice) };
+    let mut text = String::from("t,u,angle,rate\n");
+    // Twenty values a sample.
+    let mut motion = vec![[0.0; 2]];
+    let mut u = 0.0;
+    for k in 0..2000 {
+        let [mut a, mut w] = motion[motion.len() - 1];
+        if k % 20 == 0 {
+            u = normal() - 0.3 * a;
+        }
+        let [angle, rate] = sensors(&motion);
+        let (angle, rate) = (angle + 0.004 * normal(), rate + 0.01 * normal());
+        writeln!(text, "{},{u},{angle},{rate}", 0.05 * f64::from(k)).unwrap();
+        for _ in 0..20 {
+            (a, w) = (a + 0.0025 * w, w + 0.0025 * (u - w));
+            motion.push([a, w]);
+        }
+    }
+    folder.text("log.csv", &text);
+    let files = ["explain", "log.csv", "--simulation", "drive.mo"];
+    folder
+        .run(&[&files[..], &["--output", "e.json"]].concat())
+        .ok();
+    let said = json(&folder.join("e.json"));
+    assert_eq!(said["verdict"], "named", "{}", said["summary"]);
+    said["effects"][0].clone()
+}
+
+/// Another gain of the drive beside the scale of the other sensor would be the same; the gain is that of the text.
+#[test]
+fn the_sensor_is_named_that_leaves_the_parameters_where_they_are() {
+    for (wrong, scales) in [("angle", [1.12, 1.0]), ("rate", [1.0, 1.12])] {
+        let effect = effect_of_drive(|motion| {
+            let [a, w] = motion[motion.len() - 1];
+            [scales[0] * a, scales[1] * w]
+        });
+        assert_eq!(effect["effect"], "sensor_scale", "{effect}");
+        assert_eq!(effect["enters"], wrong, "{effect}");
+    }
+}

@@ -3,7 +3,7 @@
 use crate::explain::engine::fitting::candidate::Candidate;
 use crate::explain::engine::hypothesis::prefer_asked;
 use crate::explain::engine::screening::screen::Lead;
-use crate::explain::engine::terms::names::{name_rank, named, rank, special_case};
+use crate::explain::engine::terms::names::{SPECIFIC, name_rank, named, rank, special_case};
 use crate::explain::engine::terms::term::Starts;
 use crate::physics::ModelSpec;
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
@@ -118,6 +118,19 @@ fn prefer_special_case(spec: &ModelSpec, fitted: &mut [Fitted]) {
     }
 }
 
+/// What a fit costs that moves parameters from their values in the text: each is an observation with the variance of a uniform
+/// distribution between the bounds. It decides where the recording does not, as between a sensor and what another gain does to
+/// the other sensors.
+fn moved(spec: &ModelSpec, fit: &Fit) -> f64 {
+    let parameters = spec.parameters().into_iter().map(|v| spec.variable(v));
+    let costs = parameters.zip(&fit.point).map(|(v, value)| {
+        let variance = (v.max - v.min).powi(2) / 12.0;
+        v.number
+            .map_or(0.0, |text| (value - text).powi(2) / variance)
+    });
+    costs.filter(|c| c.is_finite()).sum()
+}
+
 /// Puts fits in the order in which they are given as answers, from one by their gains.
 pub(in crate::explain::engine) fn order(spec: &ModelSpec, fitted: &mut [Fitted]) {
     // Among those that explain the recording as well as the best, the one with a name of its own comes first. Of several such
@@ -139,7 +152,15 @@ pub(in crate::explain::engine) fn order(spec: &ModelSpec, fitted: &mut [Fitted])
         let (first, of_name) = (fitted[0].gain, name_rank(spec, &fitted[0]));
         let equal = |f: &&Fitted| first - f.gain <= TIE.0 && name_rank(spec, f) == of_name;
         let equals = fitted[..ties].iter().take_while(equal).count();
-        fitted[..equals].sort_by_key(|f| rank(spec, f));
+        // Formulas of one curve differ in what they are, not in where they leave the parameters.
+        let supported = |f: &Fitted| match rank(spec, f) < SPECIFIC {
+            true => f.gain - moved(spec, &f.fit),
+            false => f.gain,
+        };
+        fitted[..equals].sort_by(|a, b| {
+            let by_rank = rank(spec, a).cmp(&rank(spec, b));
+            by_rank.then(supported(b).total_cmp(&supported(a)))
+        });
         prefer_special_case(spec, fitted);
         prefer_asked(fitted);
     }
