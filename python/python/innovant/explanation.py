@@ -102,8 +102,8 @@ class Explanation:
 
         `u` is samples x inputs or a frame with the columns of the inputs. An explanation relative to a simulator that is
         not linear, or of its sensors, needs the answer of that simulator to the same inputs, `simulation`; when it was made
-        with a function, that is called. Of a plant in equations `x0` gives initial states by name, and `dt` is the sample time of `u`: that
-        of the recording without it, which a document does not contain.
+        with a function, that is called. Of a plant in equations `x0` gives initial states by name, and `dt` is the sample
+        time of `u`: that of the recording without it, which a document does not contain.
         """
         plant = self.plant
         if plant is not None:

@@ -7,7 +7,7 @@ use crate::explain::engine::terms::term::{Port, Starts};
 use crate::explain::engine::terms::values::filled;
 use crate::explain::engine::thresholds::GLANCED_ACCURACY;
 use crate::physics::estimate::{Fit, PlantRecording};
-use crate::physics::{ModelSpec, Plant};
+use crate::physics::{ModelSpec, Node, Plant};
 
 /// Shortest time constant, in samples.
 const LEAST_SAMPLES: f64 = 0.1;
@@ -89,7 +89,12 @@ pub(crate) fn candidate(
     // The argument: for a sensor what it shows, for an input the input itself.
     let text = match (argument, lead.place) {
         (None, _) => String::new(),
-        (Some(_), Place::Equation(_)) if lead.sensor => "{v}".to_owned(),
+        (Some(_), Place::Equation(at)) if lead.sensor => {
+            match spec.expressions.node(spec.equations[at].right) {
+                Node::Variable(_) => "{v}".to_owned(),
+                _ => "({v})".to_owned(),
+            }
+        }
         (Some(a), _) => a.expression.clone(),
     };
     let memories: Vec<String> = (0..term.memories.len())
@@ -234,7 +239,7 @@ mod tests {
     use crate::explain::engine::terms::library::TERMS;
     use crate::explain::engine::terms::term::Needs;
     use crate::explain::engine::terms::values::grid;
-    use crate::physics::parse;
+    use crate::physics::{Hold, parse};
 
     #[test]
     fn every_term_of_the_library_makes_a_plant_with_names_of_its_own() {
@@ -292,5 +297,42 @@ mod tests {
         }
         let all: BTreeSet<&str> = TERMS.iter().map(|t| t.id).collect();
         assert_eq!(made, all);
+    }
+
+    /// At no time constant and beyond no limit a sensor shows what the equations say, also where that is a sum.
+    #[test]
+    fn a_sensor_of_a_sum_shows_the_sum() {
+        let text = "model M parameter Real d = 0.5; input Real u; output Real y; Real x(start=1);
+             equation der(x) = u - x; y = x + d*u; end M;";
+        let spec = parse(text).unwrap();
+        let wave: Vec<f64> = (0..200).map(|k| (0.3 * f64::from(k)).sin()).collect();
+        let recordings = [PlantRecording {
+            inputs: vec![wave.clone()],
+            outputs: vec![wave.clone()],
+            sample_time: 0.1,
+            start_time: 0.0,
+        }];
+        let run = |plant: &Plant| {
+            let all = recordings[0].run(plant, &plant.nominal(), Hold::Zero);
+            all.unwrap().remove(0)
+        };
+        let expected = run(&Plant::new(spec.clone()));
+        let mut arguments = arguments(&spec);
+        arguments.iter_mut().for_each(|a| a.set(vec![wave.clone()]));
+        let place = Place::Equation(sensors(&spec)[0]);
+        for (id, shapes) in [
+            ("sensor_lag", vec![1e-3]),
+            ("sensor_saturation", vec![-9.0, 9.0]),
+        ] {
+            let term = TERMS.iter().find(|t| t.id == id).unwrap();
+            let mut lead = Lead::untested(term, place).at(place, Some(0), &shapes);
+            lead.sensor = true;
+            let made = candidate(&spec, &lead, &arguments, &recordings).unwrap();
+            // From the second sample on, when the lag has caught up.
+            let late = run(&made.plant).into_iter().zip(&expected).skip(1);
+            for (found, expected) in late {
+                assert!((found - expected).abs() < 0.02, "{id}: {found} {expected}");
+            }
+        }
     }
 }
