@@ -321,7 +321,7 @@ mod tests {
         arguments.iter_mut().for_each(|a| a.set(vec![wave.clone()]));
         let place = Place::Equation(sensors(&spec)[0]);
         for (id, shapes) in [
-            ("sensor_lag", vec![0.01]),
+            ("sensor_lag", vec![0.02]),
             ("sensor_saturation", vec![-9.0, 9.0]),
         ] {
             let term = TERMS.iter().find(|t| t.id == id).unwrap();
