@@ -127,12 +127,20 @@ fn explain_nonlinear(
     let equations = sound.then(|| columns::equations(checked)).flatten();
     let by_equations =
         || columns::explain_equations(equations.as_ref()?, checked, &options.without);
+    let sensors = || {
+        sound
+            .then(|| columns::explain_sensors(checked, &options.without))
+            .flatten()
+    };
     if equations
         .as_ref()
         .is_some_and(|e| e.misfit <= columns::REPRODUCED)
         && let Some(explanation) = by_equations()
     {
-        return Ok(explanation);
+        // Equations with many numbers may reproduce columns that were made by others. A sensor that explains the recording as
+        // closely leaves the simulator as it is.
+        let sensors = sensors().filter(|s| stands_in(s, &explanation));
+        return Ok(sensors.unwrap_or(explanation));
     }
     let known = simulator.learn(checked)?;
     let found = inquire(&known, checked.mask(&known.data), allowed);
@@ -143,10 +151,7 @@ fn explain_nonlinear(
     if !is_doubtful(&explanation) {
         return Ok(explanation);
     }
-    if sound
-        && let Some(sensors) = columns::explain_sensors(checked, &options.without)
-        && stands_in(&sensors, &explanation)
-    {
+    if let Some(sensors) = sensors().filter(|s| stands_in(s, &explanation)) {
         return Ok(sensors);
     }
     Ok(match by_equations() {
