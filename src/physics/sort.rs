@@ -66,6 +66,7 @@ pub(crate) fn determine(draft: Draft) -> Result<ModelSpec, Vec<SpecError>> {
             number: settled.number,
             span: declared.span,
             uncorrected: false,
+            starts: Vec::new(),
         })
         .collect();
     Ok(ModelSpec {

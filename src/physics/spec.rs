@@ -52,6 +52,8 @@ pub struct Variable {
     /// A state that an observer does not correct, such as the memory of an effect: corrected, it would stand for any
     /// disturbance.
     pub(crate) uncorrected: bool,
+    /// Where such a memory starts in each recording, where that is known.
+    pub(crate) starts: Vec<f64>,
 }
 
 impl Variable {

@@ -36,9 +36,10 @@ end Drive;
     )
 }
 
-fn explained(torque: &str, seed: u64) -> serde_json::Value {
+/// The answer where the simulator is `simulator`, and the plant has a shaft with `torque`.
+fn explained(simulator: &str, torque: &str, seed: u64) -> serde_json::Value {
     let folder = Folder::new();
-    folder.text("stiff.mo", STIFF);
+    folder.text("simulator.mo", simulator);
     folder.text("shaft.mo", &with_shaft(torque));
     let mut dice = ChaCha8Rng::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut dice) };
@@ -63,7 +64,7 @@ fn explained(torque: &str, seed: u64) -> serde_json::Value {
         writeln!(log, "{t},{u},{}", y + 0.05 * normal()).unwrap();
     }
     folder.text("log.csv", &log);
-    let arguments = ["explain", "log.csv", "--simulation", "stiff.mo"];
+    let arguments = ["explain", "log.csv", "--simulation", "simulator.mo"];
     folder
         .run(&[&arguments[..], &["--output", "e.json"]].concat())
         .ok();
@@ -79,7 +80,7 @@ fn parameter(said: &serde_json::Value, name: &str) -> (f64, f64) {
 #[test]
 fn a_shaft_that_twists_is_found_with_its_share_and_frequency() {
     // The load of 0.015 is 3/7 of all; alone on the shaft it swings at sqrt(20/0.015) rad/s.
-    let said = explained("20*twist + 0.03*(w - wl)", 1);
+    let said = explained(STIFF, "20*twist + 0.03*(w - wl)", 1);
     assert_eq!(said["verdict"], "named", "{}", said["summary"]);
     assert_eq!(said["effects"][0]["effect"], "extra_mode");
     assert_eq!(said["effects"][0]["enters"], "w");
@@ -94,9 +95,24 @@ fn a_shaft_that_twists_is_found_with_its_share_and_frequency() {
 fn play_between_two_parts_is_found_with_its_width() {
     // Damped: parts that rattle for long move so irregularly that a free run does not follow.
     let contact = "40*(max(twist - 0.1, 0) + min(twist + 0.1, 0))";
-    let said = explained(&format!("{contact} + 0.3*(w - wl)"), 2);
+    let said = explained(STIFF, &format!("{contact} + 0.3*(w - wl)"), 2);
     assert_eq!(said["verdict"], "named", "{}", said["summary"]);
     assert_eq!(said["effects"][0]["effect"], "backlash");
     let (play, std) = parameter(&said, "backlash_g");
     assert!((play - 0.1).abs() < 4.0 * std + 0.002, "{play} +- {std}");
+}
+
+#[test]
+fn play_in_a_shaft_that_the_simulator_has_is_found_with_its_width() {
+    let contact = "40*(max(twist - 0.03, 0) + min(twist + 0.03, 0))";
+    let simulator = with_shaft("k*twist + 0.3*(w - wl)").replace(
+        "  input",
+        "  parameter Real k(unit=\"N.m/rad\", min=20, max=80) = 45;\n  input",
+    );
+    let said = explained(&simulator, &format!("{contact} + 0.3*(w - wl)"), 3);
+    assert_eq!(said["verdict"], "named", "{}", said["summary"]);
+    assert_eq!(said["effects"].as_array().map(Vec::len), Some(1));
+    assert_eq!(said["effects"][0]["effect"], "backlash");
+    let (play, std) = parameter(&said, "backlash_g");
+    assert!((play - 0.03).abs() < 4.0 * std + 0.0006, "{play} +- {std}");
 }

@@ -118,8 +118,22 @@ fn block(samples: usize, fold: usize) -> std::ops::Range<usize> {
     samples * fold / BLOCKS..samples * (fold + 1) / BLOCKS
 }
 
-/// The blocks of a recording, from and to, in seconds.
-pub(crate) fn blocks(recording: &PlantRecording) -> Vec<[f64; 2]> {
+/// Samples that a fold leaves out of recording `r`: a block of each, or of several recordings whole ones. A step response says
+/// little without its beginning.
+fn left_out(recordings: usize, r: usize, samples: usize, fold: usize) -> std::ops::Range<usize> {
+    match (recordings >= BLOCKS, r % BLOCKS == fold) {
+        (false, _) => block(samples, fold),
+        (true, true) => 0..samples,
+        (true, false) => 0..0,
+    }
+}
+
+/// The blocks of the first recording, from and to, in seconds; none where whole recordings are left out.
+pub(crate) fn blocks(recordings: &[PlantRecording]) -> Vec<[f64; 2]> {
+    let recording = match recordings {
+        [first, others @ ..] if others.len() + 1 < BLOCKS => first,
+        _ => return vec![],
+    };
     let samples = recording.outputs.first().map_or(0, Vec::len);
     let at = |k: usize| recording.start_time + k as f64 * recording.sample_time;
     (0..BLOCKS)
@@ -202,18 +216,20 @@ pub(super) fn held_out(
         .into_par_iter()
         .map(|fold| {
             let (mut kept, mut kept_start) = (Vec::new(), Vec::new());
-            let (mut left_out, mut left_out_start) = (Vec::new(), Vec::new());
+            let (mut test, mut test_start) = (Vec::new(), Vec::new());
             for (r, recording) in recordings.iter().enumerate() {
                 let samples = recording.outputs.first()?.len();
-                let out = block(samples, fold);
+                let out = left_out(recordings.len(), r, samples, fold);
                 for range in [0..out.start, out.end..samples] {
                     if !range.is_empty() {
                         kept_start.extend(at(r, range.start));
                         kept.push(cut(recording, range));
                     }
                 }
-                left_out_start.extend(at(r, out.start));
-                left_out.push(cut(recording, out));
+                if !out.is_empty() {
+                    test_start.extend(at(r, out.start));
+                    test.push(cut(recording, out));
+                }
             }
             let training = Study::new(&released, &kept, &options).ok()?;
             let mut point = fit.point[..parameters].to_vec();
@@ -232,9 +248,9 @@ pub(super) fn held_out(
             };
             let fitted = released.with_values(&again[..parameters]);
             let of_states = only_states(&fitted, hold);
-            let test = Study::new(&fitted, &left_out, &of_states).ok()?;
-            let run = test.least_squares_with(&left_out_start, AGAIN)?;
-            test.residual(&run)
+            let study = Study::new(&fitted, &test, &of_states).ok()?;
+            let run = study.least_squares_with(&test_start, AGAIN)?;
+            study.residual(&run)
         })
         .collect();
     let folds = folds?;

@@ -41,11 +41,23 @@ struct Rival {
     misspecified: bool,
 }
 
-/// What the equations leave out. Of long recordings a part is searched; what it shows is fitted to all samples and judged by them.
+/// What the equations leave out.
 ///
 /// # Errors
 /// As those of an estimation.
 pub(crate) fn select(
+    plant: &Plant,
+    recordings: &[PlantRecording],
+    hold: Hold,
+    scope: &Scope,
+) -> Result<Found, EstimateError> {
+    let mut found = decide_by_part(plant, recordings, hold, scope)?;
+    found.estimate_initial_states(recordings);
+    Ok(found)
+}
+
+/// Of long recordings a part is searched; what it shows is fitted to all samples and judged by them.
+fn decide_by_part(
     plant: &Plant,
     recordings: &[PlantRecording],
     hold: Hold,
@@ -97,8 +109,32 @@ fn decide(
         .iter()
         .any(|r| r.accepted == searches[0].accepted && r.misspecified);
     // With an observer the residuals are white wherever the observer follows: that proves no effect.
-    let proved = (adequate || little_left && !misspecified)
-        && (searches[0].accepted == 0 || searches[0].fit.form == Form::FreeRun);
+    let proved = match searches[0].accepted {
+        0 => adequate && !misspecified,
+        _ => adequate || little_left && !misspecified,
+    } && searches[0].fit.form == Form::FreeRun;
+    if std::env::var("INNOVANT_DEBUG").is_ok() {
+        for r in &rivals {
+            eprintln!(
+                "rival {} {} {:?} held {:.4} whole {:.4} mis {}",
+                r.search,
+                r.accepted,
+                r.estimator,
+                ratio_of(r),
+                r.whole,
+                r.misspecified
+            );
+        }
+        eprintln!(
+            "adequate {adequate} strongest {strongest} tests {tests} little {little_left} holds {holds} judged {judged} stays {stays} proved {proved} form {:?} gains {:?}",
+            searches[0].fit.form,
+            searches[0].steps[0]
+                .iter()
+                .take(6)
+                .map(|f| (named(&plant.spec, f), f.argument.clone(), f.gain))
+                .collect::<Vec<_>>()
+        );
+    }
     if stays && !(judged && holds && proved) {
         let known = rivals
             .iter()
@@ -140,6 +176,36 @@ fn decide(
             Some(winner) => winner,
             None => chosen,
         };
+    }
+    if std::env::var("INNOVANT_DEBUG").is_ok() {
+        for r in rivals.iter().filter(|r| r.search > 0) {
+            eprintln!(
+                "rival {} {} {:?} held {:.4} whole {:.4} mis {}",
+                r.search,
+                r.accepted,
+                r.estimator,
+                ratio_of(r),
+                r.whole,
+                r.misspecified
+            );
+        }
+        for s in &searches[1..] {
+            eprintln!(
+                "free-run search gains {:?}",
+                s.steps[0]
+                    .iter()
+                    .take(6)
+                    .map(|f| (
+                        named(&plant.spec, f),
+                        f.argument.clone(),
+                        f.gain,
+                        f.explains,
+                        f.proved
+                    ))
+                    .collect::<Vec<_>>()
+            );
+        }
+        eprintln!("chosen {chosen:?}");
     }
     let (which, accepted) = chosen;
     let mut found = searches.swap_remove(which);
@@ -269,25 +335,43 @@ fn winner(rivals: &[&Rival]) -> Option<(usize, usize)> {
 /// Every number of effects of a search, by both estimators, and once the plant as it was given.
 fn rivals(found: &Found, search: usize, recordings: &[PlantRecording], hold: Hold) -> Vec<Rival> {
     let mut all = Vec::new();
+    // The plant with an effect less, by least squares.
+    let mut fewer: Option<Fit> = None;
     for accepted in 0..=found.accepted {
         let (plant, fit) = found.stage(accepted);
+        let nested = fewer.take().and_then(|fewer| {
+            let candidate = &found.steps[accepted - 1].first()?.candidate;
+            let new = candidate.values.len();
+            let first = plant.spec.parameters().len() - new;
+            let mut from = candidate.from(&fewer, first);
+            from.point[first..][..new].copy_from_slice(&fit.point[first..][..new]);
+            Some(from.point)
+        });
         let of_search = match found.options.least_squares {
             true => Estimator::FreeRun,
             false => Estimator::Likelihood,
         };
-        let mut fits = vec![(of_search, fit.clone(), false)];
+        let given = match (search, accepted) {
+            (0, 0) => as_given(plant, recordings, hold),
+            _ => None,
+        };
+        let own = [(of_search, fit.clone())];
+        let given = given.map(|given| (Estimator::Given, given));
+        let mut fits: Vec<(Estimator, Fit, bool)> = (own.into_iter().chain(given))
+            .map(|(estimator, fit)| (estimator, fit, false))
+            .collect();
+        let others: Vec<Fit> = fits.iter().map(|f| f.1.clone()).collect();
         if of_search == Estimator::Likelihood
-            && let Some((least_squares, misspecified)) =
-                by_least_squares(plant, fit, recordings, hold)
+            && let Some((least_squares, refuted)) =
+                by_least_squares(plant, &others, nested, recordings, hold)
         {
-            fits[0].2 = misspecified;
-            fits.push((Estimator::FreeRun, least_squares, false));
+            for ((.., misspecified), refuted) in fits.iter_mut().zip(refuted) {
+                *misspecified = refuted;
+            }
+            fewer = Some(least_squares.clone());
+            fits.insert(1, (Estimator::FreeRun, least_squares, false));
         }
-        if (search, accepted) == (0, 0)
-            && let Some(given) = as_given(plant, recordings, hold)
-        {
-            fits.push((Estimator::Given, given, false));
-        }
+        let first = all.len();
         for (estimator, fit, misspecified) in fits {
             let Some(held_out) = held_out(plant, &fit, estimator, recordings, hold) else {
                 continue;
@@ -305,41 +389,76 @@ fn rivals(found: &Found, search: usize, recordings: &[PlantRecording], hold: Hol
                 misspecified,
             });
         }
+        drop_refuted(&mut all, first);
     }
     all
 }
 
-/// The least squares fit of the free run, and whether the likelihood's is worse by more than two estimates of the same
-/// parameters can differ (J. A. Hausman, *Econometrica* 46, 1978: where both are consistent, the excess of the sum of squares
-/// over its minimum, in units of the noise, is at most chi-square with a degree of freedom for each parameter).
+/// Drops what least squares refutes: values that leave more than twice its mean square over all data, and more than the noise
+/// allows. Blocks left out of a short recording hold too little to say otherwise.
+fn drop_refuted(rivals: &mut Vec<Rival>, first: usize) {
+    let of_free_run = |r: &&Rival| r.estimator == Estimator::FreeRun;
+    let Some(least) = rivals[first..].iter().find(of_free_run).map(|r| r.whole) else {
+        return;
+    };
+    let refuted = |r: &Rival| r.misspecified && 1.0 - (least / r.whole).powi(2) >= EXPLAINED;
+    let kept = rivals.split_off(first);
+    rivals.extend(kept.into_iter().filter(|r| !refuted(r)));
+}
+
+/// The least squares fit of the free run, and whether it refutes each of the other fits, of which the first is the likelihood's.
+///
+/// Least squares has summits of its own: it starts from the likelihood's point, and from `nested`, the fit with an effect less; of
+/// the plant alone where [`estimate`](crate::physics::estimate::estimate) starts.
 fn by_least_squares(
     plant: &Plant,
-    likelihood: &Fit,
+    others: &[Fit],
+    nested: Option<Vec<f64>>,
     recordings: &[PlantRecording],
     hold: Hold,
-) -> Option<(Fit, bool)> {
+) -> Option<(Fit, Vec<bool>)> {
     let options = all_free(plant, hold, Estimator::FreeRun);
     let limited = plant.clone().with_most_steps(MOST_STEPS);
     let study = Study::new(&limited, recordings, &options).ok()?;
-    let least_squares = study.least_squares(&likelihood.point)?;
-    if !study.follows(&least_squares) {
-        return None;
-    }
-    let numbers = least_squares.point.len();
-    let at = |point: &[f64]| Fit {
-        form: Form::FreeRun,
-        point: point[..numbers].to_vec(),
-        ..least_squares.clone()
+    let from_likelihood = study.least_squares(&others.first()?.point);
+    let otherwise = match nested {
+        None => study.fit(Some(Form::FreeRun)).ok(),
+        Some(nested) => study.least_squares(&nested),
     };
-    let square = |fit: &Fit| -> Option<f64> {
-        let whitened = fit.noise.whiten_kept(&study.residual(fit)?, study.mask());
+    let fit = (from_likelihood.into_iter().chain(otherwise))
+        .min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
+    let refuted = |other: &Fit| refutes(&study, &fit, &other.point).unwrap_or(false);
+    let refuted = others.iter().map(refuted).collect();
+    study.follows(&fit).then_some((fit, refuted))
+}
+
+/// Whether other values of the same parameters are worse than two estimates can differ (J. A. Hausman, *Econometrica* 46, 1978:
+/// where both are consistent, the excess of the sum of squares over its minimum, in units of the noise, is at most chi-square with a
+/// degree of freedom for each parameter).
+fn refutes(study: &Study, least_squares: &Fit, point: &[f64]) -> Option<bool> {
+    let numbers = least_squares.point.len();
+    let square = |point: &[f64]| -> Option<f64> {
+        let fit = Fit {
+            form: Form::FreeRun,
+            point: point[..numbers].to_vec(),
+            ..least_squares.clone()
+        };
+        let whitened = (fit.noise).whiten_kept(&study.residual(&fit)?, study.mask());
         Some(whitened.iter().map(|e| e * e).sum())
     };
-    let excess = square(&at(&likelihood.point))? - square(&least_squares)?;
-    let share = study.effective_share(&least_squares)?;
+    let excess = square(point)? - square(&least_squares.point)?;
+    let share = study.effective_share(least_squares)?;
     let law = ChiSquared::new(numbers as f64).ok()?;
-    Some((
-        least_squares,
-        law.sf(share * excess.max(0.0)) < MISSPECIFIED,
-    ))
+    Some(law.sf(share * excess.max(0.0)) < MISSPECIFIED)
+}
+
+fn ratio_of(r: &Rival) -> f64 {
+    let logs: f64 = r
+        .held_out
+        .squares
+        .iter()
+        .zip(&r.held_out.variances)
+        .map(|(a, b)| 0.5 * (a / b).ln())
+        .sum();
+    (logs / r.held_out.squares.len() as f64).exp()
 }

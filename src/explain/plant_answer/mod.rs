@@ -22,6 +22,7 @@ use self::within_bounds::within_bounds;
 
 use super::document::plots::{extremes, spectrum, spectrum_picture};
 use super::engine::fitting::fitted::Fitted;
+use super::engine::fitting::initial_states::with_free_states;
 use super::engine::holdout::{EXPLAINED, HeldOut, blocks};
 use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
 use super::engine::scope::Scope;
@@ -31,7 +32,7 @@ use super::engine::terms::term::Port;
 use super::engine::thresholds::{LEFT, SURE, chance};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
-    FitTable, NoiseFound, ParameterChange, Remaining, SignalTraces, Verdict,
+    FitTable, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
 };
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
@@ -41,6 +42,8 @@ use crate::physics::{Hold, ModelSpec, Plant, Span, units_in_words};
 
 /// A parameter is said to differ from the text where it does by so many standard deviations.
 const DIFFERENT: f64 = 3.3;
+/// Standard deviations from 0 of a parameter that is not 0 with 95 % confidence.
+const NOT_ZERO: f64 = 1.96;
 /// Points of a picture.
 const TRACE_POINTS: usize = 1500;
 
@@ -126,6 +129,12 @@ fn level(recorded: &[f64]) -> Vec<f64> {
     vec![sum / f64::from(count.max(1)); recorded.len()]
 }
 
+/// Whether a recording tells one of an effect's parameters from 0.
+fn is_determined(effect: &EffectFound) -> bool {
+    let differs = |q: &Quantity| q.std.is_some_and(|std| q.value.abs() > NOT_ZERO * std);
+    effect.parameters.values().any(differs)
+}
+
 fn figure(recorded: &[f64], simulated: &[f64]) -> FitFigure {
     let pairs: Vec<(f64, f64)> = recorded
         .iter()
@@ -191,6 +200,7 @@ impl Answer<'_> {
         let curves = effects.iter().any(|e| e.effect == "law");
         let sure = (gain >= SURE || best.is_some_and(|b| b.proved))
             && follows
+            && effects.iter().all(is_determined)
             && (adequate || explains && !curves);
         let verdict = if self.found.accepted > 0 && sure {
             Verdict::Named
@@ -288,7 +298,7 @@ impl Answer<'_> {
                 train: train.clone(),
                 heldout: held_out,
                 heldout_blocks: match self.found.held_out {
-                    Some(_) => self.recordings.first().map_or_else(Vec::new, blocks),
+                    Some(_) => blocks(self.recordings),
                     None => vec![],
                 },
             },
@@ -319,10 +329,7 @@ impl Answer<'_> {
             curve: None,
             model: None,
             plant: Some(AugmentedPlant {
-                modelica: self
-                    .found
-                    .plant
-                    .text_at(&self.whole.points(&self.found.fit)[0]),
+                modelica: self.text(),
                 outputs: self.channels.clone(),
                 simulation: None,
                 simulated_inputs: vec![],
@@ -339,6 +346,13 @@ impl Answer<'_> {
             recordings,
             version: env!("CARGO_PKG_VERSION").to_owned(),
         }
+    }
+
+    /// The plant with what was found, as it ran over the first recording. A fresh recording starts elsewhere: no start is certain.
+    fn text(&self) -> String {
+        let point = &self.whole.points(&self.found.fit)[0];
+        let free = with_free_states(&self.found.plant);
+        free.as_ref().unwrap_or(&self.found.plant).text_at(point)
     }
 
     /// Free runs of an output in blocks that their fits had not seen.

@@ -459,9 +459,17 @@ impl<'a> Problem<'a> {
 
     /// Parameters and initial states of each recording.
     pub(crate) fn points(&self, numbers: &[f64]) -> Vec<Point> {
+        let spec = self.spec();
+        let states = spec.states();
         (0..self.recordings.len())
             .map(|r| {
                 let mut point = self.nominal.clone();
+                for (start, &v) in point.start.iter_mut().zip(&states) {
+                    let variable = spec.variable(v);
+                    if variable.fixed && variable.starts.len() == self.recordings.len() {
+                        *start = Some(variable.starts[r]);
+                    }
+                }
                 for (&i, &v) in self.free.iter().zip(numbers) {
                     point.parameters[i] = v;
                 }

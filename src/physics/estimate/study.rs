@@ -265,6 +265,12 @@ impl<'a> Study<'a> {
         self.problem.points(&fit.point)
     }
 
+    /// Initial states of each recording, also those that are not free.
+    pub(crate) fn starts(&self, fit: &Fit) -> Vec<Vec<f64>> {
+        let points = self.points(fit);
+        points.iter().map(|p| self.plant.start(p)).collect()
+    }
+
     /// Gain of the observer, in the innovation form.
     pub(crate) fn gain(&self, fit: &Fit) -> Option<DMatrix<f64>> {
         (fit.form == Form::Innovation).then(|| self.problem.gain(&fit.point))

@@ -361,5 +361,6 @@ fn blank(name: &str) -> Variable {
         number: None,
         span: Span::default(),
         uncorrected: false,
+        starts: Vec::new(),
     }
 }

@@ -28,6 +28,9 @@ pub(crate) struct Candidate {
     /// Values that they start from.
     pub(crate) values: Vec<f64>,
     pub(crate) new_states: usize,
+    /// Free initial states of the plant without the term, and those of the term in each recording.
+    pub(crate) own_starts: usize,
+    pub(crate) starts: Vec<Vec<f64>>,
     /// What stands at the place now, and the equations of the memories in it.
     pub(crate) equation: String,
 }
@@ -72,7 +75,13 @@ pub(crate) fn candidate(
                 f64::INFINITY,
             ),
             Starts::Share(_) => LEAST_SHARE,
-            Starts::Travel(_) => (LEAST_YIELD * value, f64::INFINITY),
+            Starts::Travel(_) => {
+                // What yields within a sample is a function of the sign, which has terms of its own.
+                let of_a_sample = argument
+                    .filter(|a| !a.velocity)
+                    .map_or(0.0, |a| h * a.size_quantile(0.5));
+                (of_a_sample.max(LEAST_YIELD * value), f64::INFINITY)
+            }
             _ if shape.positive => (1e-3 * value, f64::INFINITY),
             _ => (f64::NEG_INFINITY, f64::INFINITY),
         };
@@ -133,7 +142,9 @@ pub(crate) fn candidate(
         };
         let previous = memory.previous(&memories);
         let rate = filled(memory.rate, term, &source, &previous, &shapes, h);
-        edit.declarations.push(memory.declaration(name, first));
+        let free = memory.has_free_start(argument);
+        edit.declarations
+            .push(memory.declaration(name, first, free));
         edit.equations.push(memory.equation(name, &rate));
     }
     let new_states = term.memories.iter().filter(|m| !m.sampled).count();
@@ -169,9 +180,19 @@ pub(crate) fn candidate(
     debug_assert!(!(lead.sensor && term.port != Port::Sensor));
     edit.changes.push((lead.place, format!("{{v}} + {added}")));
     let mut changed = edit.apply(spec).ok()?;
-    for memory in &memories {
-        let state = changed.find(memory)?;
-        changed.variables[state.index()].uncorrected = true;
+    let mut starts = vec![Vec::new(); recordings.len()];
+    for (memory, name) in term.memories.iter().zip(&memories) {
+        let of_recordings: Vec<f64> = argument.map_or_else(Vec::new, |a| {
+            let first = a.values.iter().map(|values| values[0]);
+            first.map(|v| memory.start.at(v)).collect()
+        });
+        if memory.has_free_start(argument) {
+            let each = starts.iter_mut().zip(&of_recordings);
+            each.for_each(|(to, &start)| to.push(start));
+        }
+        let state = changed.find(name)?;
+        let state = &mut changed.variables[state.index()];
+        (state.uncorrected, state.starts) = (true, of_recordings);
     }
     let names = edit.parameters.iter().map(|p| p.name.clone()).collect();
     let equation = equation_text(&changed, spec, lead.place);
@@ -186,7 +207,15 @@ pub(crate) fn candidate(
         names,
         values,
         new_states,
+        own_starts: free_starts(spec),
+        starts,
     })
+}
+
+/// Number of initial states that are estimated.
+fn free_starts(spec: &ModelSpec) -> usize {
+    let states = spec.states().into_iter();
+    states.filter(|&v| !spec.variable(v).fixed).count()
 }
 
 /// The changed equation as it stands in the new text.
@@ -222,8 +251,31 @@ impl Candidate {
     /// The numbers of a fit of the plant without the term, with the term's.
     pub(crate) fn from(&self, fit: &Fit, parameters: usize) -> Fit {
         let (own, others) = fit.point.split_at(parameters);
+        let (starts, gains) = others.split_at(self.own_starts * self.starts.len());
+        let mut point = [own, &self.values].concat();
+        for (r, new) in self.starts.iter().enumerate() {
+            point.extend(&starts[r * self.own_starts..][..self.own_starts]);
+            point.extend(new);
+        }
+        point.extend(gains);
         Fit {
-            point: [own, &self.values, others].concat(),
+            point,
+            ..fit.clone()
+        }
+    }
+
+    /// The numbers of a fit of the plant with the term, without the term's; the plant without it has so many parameters.
+    pub(crate) fn without(&self, fit: &Fit, parameters: usize) -> Fit {
+        let mut point = fit.point[..parameters].to_vec();
+        let mut others = &fit.point[parameters + self.values.len()..];
+        for new in &self.starts {
+            let (of_recording, behind) = others.split_at(self.own_starts + new.len());
+            point.extend(&of_recording[..self.own_starts]);
+            others = behind;
+        }
+        point.extend(others);
+        Fit {
+            point,
             ..fit.clone()
         }
     }

@@ -226,7 +226,8 @@ impl Edit {
         let mut changed = parse(&self.text(spec))?;
         for known in spec.variables.iter().filter(|v| v.uncorrected) {
             if let Some(state) = changed.find(&known.name) {
-                changed.variables[state.index()].uncorrected = true;
+                let state = &mut changed.variables[state.index()];
+                (state.uncorrected, state.starts) = (true, known.starts.clone());
             }
         }
         Ok(changed)

@@ -53,27 +53,20 @@ pub(in crate::explain::engine) fn alone(
     };
     let lead = second.lead.clone().at(place, argument, &second.shapes);
     let made = candidate(spec, &lead, &arguments, recordings)?;
-    // Numbers of both: parameters, those of the first, those of the second, initial states, gains of an observer.
-    let own = study.parameters();
-    let dropped = first.candidate.values.len();
-    let mut point = second.fit.point.clone();
-    if second.fit.form != baseline.form || point.len() < own + dropped {
+    if second.fit.form != baseline.form {
         return None;
     }
-    point.drain(own..own + dropped);
-    let expected = baseline.point.len() + made.values.len();
-    // The states that the first has brought have gains of their own, at the end.
-    point.truncate(expected);
+    // From the numbers of both: those of the plant, with those of the second alone.
+    let own = study.parameters();
+    let dropped = first.candidate.values.len();
+    let values = &second.fit.point[own + dropped..][..made.values.len()];
+    let of_first = second.without_term(own + dropped);
+    let without = first.candidate.without(&of_first, own);
+    let mut from = made.from(&without, own);
+    from.point[own..][..values.len()].copy_from_slice(values);
     let options = with_more(options, made.values.len());
     let limited = made.plant.clone().with_most_steps(MOST_STEPS);
     let inner = study.of(&limited, &options).ok()?;
-    let from = Fit {
-        point,
-        ..second.fit.clone()
-    };
-    if from.point.len() != expected {
-        return None;
-    }
     let fit = inner.refit(&from, ROUNDS, THOROUGH)?;
     let gain = study.criterion(baseline) - fit.criterion - searched(&lead, recordings);
     Some(Fitted {

@@ -44,12 +44,7 @@ pub(crate) struct Fitted {
 impl Fitted {
     /// The other numbers of its fit, as those of the plant without it, which has so many parameters.
     pub(in crate::explain::engine) fn without_term(&self, parameters: usize) -> Fit {
-        let mut point = self.fit.point.clone();
-        point.drain(parameters..parameters + self.candidate.values.len());
-        Fit {
-            point,
-            ..self.fit.clone()
-        }
+        self.candidate.without(&self.fit, parameters)
     }
 
     /// The gain without the [`FEW`] values that it owes most to.

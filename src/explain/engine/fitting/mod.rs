@@ -6,6 +6,7 @@ pub(crate) mod eliminate;
 pub(crate) mod finish;
 pub(crate) mod fitted;
 pub(crate) mod formulas;
+pub(crate) mod initial_states;
 pub(crate) mod refined_curve;
 pub(crate) mod release;
 pub(crate) mod richer_form;

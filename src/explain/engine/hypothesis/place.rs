@@ -287,6 +287,8 @@ impl Hypothesis {
             names,
             values: values.to_vec(),
             new_states: 0,
+            own_starts: 0,
+            starts: vec![],
         })
     }
 

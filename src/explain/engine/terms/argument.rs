@@ -26,7 +26,7 @@ pub(crate) struct Argument {
     /// Place of the equation behind which all of it is known; none where states and inputs are enough.
     pub(crate) known_after: Option<usize>,
     pub(crate) form: ArgumentForm,
-    /// The plant declares it as the difference of two others.
+    /// The plant declares it as the difference of two others, or as the distance of two that move.
     pub(crate) is_difference: bool,
     /// Its derivative, where the plant has variables for that.
     pub(crate) rate: Option<String>,
@@ -68,7 +68,7 @@ impl Argument {
                         .all(|&v| spec.variable(v).kind != VariableKind::Input),
             angle: variables.len() == 1
                 && (unit(variables[0]) == "rad" || may_be_angle(spec, &variables)),
-            is_difference: false,
+            is_difference: variables.len() == 1 && moves_apart(spec, variables[0]),
             rate: rate(spec, &variables),
             held,
             expression,
@@ -195,6 +195,17 @@ fn rate(spec: &ModelSpec, variables: &[VariableId]) -> Option<String> {
         [a, b] => Some(format!("({} - {})", of(a)?, of(b)?)),
         _ => None,
     }
+}
+
+/// Whether a variable is the distance of two that move: `der(x) = a - b`.
+fn moves_apart(spec: &ModelSpec, v: VariableId) -> bool {
+    let is_variable = |id| matches!(spec.expressions.node(id), Node::Variable(_));
+    spec.equations.iter().any(|e| {
+        e.unknown == Unknown::Derivative(v)
+            && e.coefficient.is_none()
+            && matches!(spec.expressions.node(e.rest),
+                Node::Binary(Binary::Subtract, a, b) if is_variable(a) && is_variable(b))
+    })
 }
 
 /// The algebraic variable that is the difference of two others, in either order.

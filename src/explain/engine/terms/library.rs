@@ -195,6 +195,14 @@ pub(crate) const TERMS: &[Term] = &[
         "max({z} - {from}, 0) + min({z} + {from}, 0)",
         &[shape("from", Starts::SizeQuantiles(ABOVE), true)],
     ),
+    // Play in a spring that the equations have: it takes its force away, up to the gap `g`.
+    curve(
+        "gap",
+        Equation,
+        Difference,
+        "min(max({z}, -{g}), {g})",
+        &[shape("g", Starts::SizeQuantiles(&[0.3, 0.6, 0.9]), true)],
+    ),
     curve(
         "root_above",
         Equation,
@@ -225,6 +233,18 @@ pub(crate) const TERMS: &[Term] = &[
                 false,
             ),
         ],
+    ),
+    curve("gravity", Equation, Angle, "sin({z})", &[]),
+    curve(
+        "gravity",
+        Equation,
+        Angle,
+        "sin({z} + {p})",
+        &[shape(
+            "p",
+            Starts::Values(&[std::f64::consts::FRAC_PI_2]),
+            false,
+        )],
     ),
     curve("radiation", Equation, Radiation, "{z}", &[]),
     curve(

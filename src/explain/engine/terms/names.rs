@@ -206,6 +206,7 @@ pub(crate) fn called(
         (Port::Equation, "stribeck" | "stribeck_bristles") => "stribeck_friction",
         (Port::Equation, "bristles") => "hysteresis",
         (Port::Equation, id @ ("extra_mode" | "backlash")) => id,
+        (Port::Equation, "gap") if what == Kind::Position => "backlash",
         (Port::Equation, "one_sided") if what == Kind::Velocity => "asymmetric_damping",
         (Port::Equation, "above" | "below" | "both_sides") => match what {
             Kind::Position => "end_stop",
@@ -215,6 +216,7 @@ pub(crate) fn called(
         (Port::Equation, "root_above") if *variables == [own] => "overflow",
         (Port::Equation, "root") if *variables == [own] => "leak",
         (Port::Equation, "sine") => "cogging",
+        (Port::Equation, "gravity") => "gravity_torque",
         (Port::Equation, "periodic") => "periodic_disturbance",
         (Port::Equation, "radiation") => "radiation",
         (Port::Equation, "natural_convection")

@@ -143,7 +143,7 @@ pub(in crate::explain::engine) fn evaluate(
             for (memory, name) in instance.term.memories.iter().zip(&memories) {
                 let first = instance.argument.map_or(0.0, |a| arguments[a].values[r][0]);
                 let start = memory.start.at(first);
-                text.push_str(&memory.declaration(name, start));
+                text.push_str(&memory.declaration(name, start, false));
                 let previous = memory.previous(&memories);
                 let rate = filled(memory.rate, instance.term, &argument, &previous, &shapes, h);
                 equations.push_str(&memory.equation(name, &rate));
@@ -171,9 +171,16 @@ pub(in crate::explain::engine) fn evaluate(
 }
 
 impl Memory {
-    /// Its declaration in a text.
-    pub(crate) fn declaration(&self, name: &str, start: f64) -> String {
-        format!("Real {name}(start={}, fixed=true);", literal(start))
+    /// Its declaration in a text; with `free` its start is estimated.
+    pub(crate) fn declaration(&self, name: &str, start: f64, free: bool) -> String {
+        let fixed = if free { "" } else { ", fixed=true" };
+        format!("Real {name}(start={}{fixed});", literal(start))
+    }
+
+    /// Whether its start is estimated: that of what follows a variable of the plant. What follows an input starts where that does,
+    /// and of bristles and gaps the start matters little.
+    pub(crate) fn has_free_start(&self, argument: Option<&Argument>) -> bool {
+        self.start == MemoryStart::Argument && !self.sampled && argument.is_some_and(|a| !a.held)
     }
 
     /// What its equation calls the memories: those of the sample before.

@@ -234,6 +234,17 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
         )],
     ),
     effect(
+        "gravity_torque",
+        "torque of gravity",
+        "J*der(w) = ... + c*sin(phi), or c*sin(phi + p) for a mounting that is not upright",
+        ANY_EQUATION,
+        "an angle in rad that covers half a turn or more",
+        &[like(
+            "cogging",
+            "Turn slowly through several turns: gravity repeats once a turn.",
+        )],
+    ),
+    effect(
         "periodic_disturbance",
         "force that repeats in time",
         "m*der(v) = ... + c*sin(w*time + p)",
