@@ -15,6 +15,7 @@ mod plant_cli;
 mod plant_explain;
 mod plant_held_out;
 mod plant_hypotheses;
+mod plant_initial_states;
 mod plant_long;
 mod plant_parts;
 mod plant_search;

@@ -282,3 +282,18 @@ pub(super) fn held_out(
         .all(|s| s.is_finite())
         .then_some(HeldOut { squares, variances })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_several_recordings_whole_ones_are_left_out() {
+        let folds = |recordings: usize| -> Vec<Vec<usize>> {
+            let each = |fold| (0..recordings).map(move |r| left_out(recordings, r, 90, fold).len());
+            (0..BLOCKS).map(|fold| each(fold).collect()).collect()
+        };
+        assert_eq!(folds(2), [[30, 30], [30, 30], [30, 30]]);
+        assert_eq!(folds(4), [[90, 0, 0, 90], [0, 90, 0, 0], [0, 0, 90, 0]]);
+    }
+}

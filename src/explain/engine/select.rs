@@ -34,6 +34,9 @@ struct Rival {
     accepted: usize,
     estimator: Estimator,
     fit: Fit,
+    /// Of least squares the summit next to the likelihood's fit: where physics is missing, parameters at a higher one make up for it,
+    /// and tests there say less.
+    nearest: Option<Fit>,
     held_out: HeldOut,
     /// Error of the free run over all data.
     whole: f64,
@@ -113,33 +116,11 @@ fn decide(
         0 => adequate && !misspecified,
         _ => adequate || little_left && !misspecified,
     } && searches[0].fit.form == Form::FreeRun;
-    if std::env::var("INNOVANT_DEBUG").is_ok() {
-        for r in &rivals {
-            eprintln!(
-                "rival {} {} {:?} held {:.4} whole {:.4} mis {}",
-                r.search,
-                r.accepted,
-                r.estimator,
-                ratio_of(r),
-                r.whole,
-                r.misspecified
-            );
-        }
-        eprintln!(
-            "adequate {adequate} strongest {strongest} tests {tests} little {little_left} holds {holds} judged {judged} stays {stays} proved {proved} form {:?} gains {:?}",
-            searches[0].fit.form,
-            searches[0].steps[0]
-                .iter()
-                .take(6)
-                .map(|f| (named(&plant.spec, f), f.argument.clone(), f.gain))
-                .collect::<Vec<_>>()
-        );
-    }
     if stays && !(judged && holds && proved) {
         let known = rivals
             .iter()
             .find(|r| r.accepted == 0 && r.estimator == Estimator::FreeRun)
-            .map(|r| r.fit.clone());
+            .map(|r| r.nearest.as_ref().unwrap_or(&r.fit).clone());
         let free_run = Objective::FreeRun;
         if let Ok(found) = search(plant, recordings, hold, scope, free_run, known.as_ref()) {
             rivals.extend(self::rivals(&found, 1, recordings, hold));
@@ -176,36 +157,6 @@ fn decide(
             Some(winner) => winner,
             None => chosen,
         };
-    }
-    if std::env::var("INNOVANT_DEBUG").is_ok() {
-        for r in rivals.iter().filter(|r| r.search > 0) {
-            eprintln!(
-                "rival {} {} {:?} held {:.4} whole {:.4} mis {}",
-                r.search,
-                r.accepted,
-                r.estimator,
-                ratio_of(r),
-                r.whole,
-                r.misspecified
-            );
-        }
-        for s in &searches[1..] {
-            eprintln!(
-                "free-run search gains {:?}",
-                s.steps[0]
-                    .iter()
-                    .take(6)
-                    .map(|f| (
-                        named(&plant.spec, f),
-                        f.argument.clone(),
-                        f.gain,
-                        f.explains,
-                        f.proved
-                    ))
-                    .collect::<Vec<_>>()
-            );
-        }
-        eprintln!("chosen {chosen:?}");
     }
     let (which, accepted) = chosen;
     let mut found = searches.swap_remove(which);
@@ -360,11 +311,13 @@ fn rivals(found: &Found, search: usize, recordings: &[PlantRecording], hold: Hol
         let mut fits: Vec<(Estimator, Fit, bool)> = (own.into_iter().chain(given))
             .map(|(estimator, fit)| (estimator, fit, false))
             .collect();
+        let mut nearest = None;
         let others: Vec<Fit> = fits.iter().map(|f| f.1.clone()).collect();
         if of_search == Estimator::Likelihood
-            && let Some((least_squares, refuted)) =
+            && let Some((least_squares, refuted, next)) =
                 by_least_squares(plant, &others, nested, recordings, hold)
         {
+            nearest = next;
             for ((.., misspecified), refuted) in fits.iter_mut().zip(refuted) {
                 *misspecified = refuted;
             }
@@ -384,6 +337,7 @@ fn rivals(found: &Found, search: usize, recordings: &[PlantRecording], hold: Hol
                 accepted,
                 estimator,
                 fit,
+                nearest: nearest.take_if(|_| estimator == Estimator::FreeRun),
                 held_out,
                 whole: whole.unwrap_or(f64::INFINITY),
                 misspecified,
@@ -406,7 +360,8 @@ fn drop_refuted(rivals: &mut Vec<Rival>, first: usize) {
     rivals.extend(kept.into_iter().filter(|r| !refuted(r)));
 }
 
-/// The least squares fit of the free run, and whether it refutes each of the other fits, of which the first is the likelihood's.
+/// The least squares fit of the free run; whether it refutes each of the other fits, of which the first is the likelihood's; and
+/// the least squares fit next to that.
 ///
 /// Least squares has summits of its own: it starts from the likelihood's point, and from `nested`, the fit with an effect less; of
 /// the plant alone where [`estimate`](crate::physics::estimate::estimate) starts.
@@ -416,7 +371,7 @@ fn by_least_squares(
     nested: Option<Vec<f64>>,
     recordings: &[PlantRecording],
     hold: Hold,
-) -> Option<(Fit, Vec<bool>)> {
+) -> Option<(Fit, Vec<bool>, Option<Fit>)> {
     let options = all_free(plant, hold, Estimator::FreeRun);
     let limited = plant.clone().with_most_steps(MOST_STEPS);
     let study = Study::new(&limited, recordings, &options).ok()?;
@@ -425,11 +380,12 @@ fn by_least_squares(
         None => study.fit(Some(Form::FreeRun)).ok(),
         Some(nested) => study.least_squares(&nested),
     };
-    let fit = (from_likelihood.into_iter().chain(otherwise))
+    let fit = (from_likelihood.iter().cloned().chain(otherwise))
         .min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
     let refuted = |other: &Fit| refutes(&study, &fit, &other.point).unwrap_or(false);
     let refuted = others.iter().map(refuted).collect();
-    study.follows(&fit).then_some((fit, refuted))
+    let nearest = from_likelihood.filter(|near| study.follows(near));
+    study.follows(&fit).then_some((fit, refuted, nearest))
 }
 
 /// Whether other values of the same parameters are worse than two estimates can differ (J. A. Hausman, *Econometrica* 46, 1978:
@@ -450,15 +406,4 @@ fn refutes(study: &Study, least_squares: &Fit, point: &[f64]) -> Option<bool> {
     let share = study.effective_share(least_squares)?;
     let law = ChiSquared::new(numbers as f64).ok()?;
     Some(law.sf(share * excess.max(0.0)) < MISSPECIFIED)
-}
-
-fn ratio_of(r: &Rival) -> f64 {
-    let logs: f64 = r
-        .held_out
-        .squares
-        .iter()
-        .zip(&r.held_out.variances)
-        .map(|(a, b)| 0.5 * (a / b).ln())
-        .sum();
-    (logs / r.held_out.squares.len() as f64).exp()
 }

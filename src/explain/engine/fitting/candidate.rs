@@ -351,6 +351,42 @@ mod tests {
         assert_eq!(made, all);
     }
 
+    #[test]
+    fn initial_states_of_a_term_stand_behind_those_of_the_plant_in_each_recording() {
+        let text = "model M parameter Real a = 1; input Real u; output Real y; Real x; Real v;
+             equation der(x) = v; der(v) = u - a*v; y = x; end M;";
+        let spec = parse(text).unwrap();
+        let column = vec![0.5; 50];
+        let recording = PlantRecording {
+            inputs: vec![column.clone()],
+            outputs: vec![column.clone()],
+            sample_time: 0.1,
+            start_time: 0.0,
+        };
+        let recordings = [recording.clone(), recording];
+        let mut arguments = arguments(&spec);
+        arguments
+            .iter_mut()
+            .for_each(|a| a.set(vec![vec![3.0; 50], vec![7.0; 50]]));
+        let place = Place::Equation(sensors(&spec)[0]);
+        let term = TERMS.iter().find(|t| t.id == "sensor_lag").unwrap();
+        let shown = arguments.iter().position(|a| a.expression == "x");
+        let mut lead = Lead::untested(term, place).at(place, shown, &[0.2]);
+        lead.sensor = true;
+        let made = candidate(&spec, &lead, &arguments, &recordings).unwrap();
+        let fit = Fit {
+            form: crate::physics::estimate::Form::Innovation,
+            point: vec![1.0, 10.0, 11.0, 20.0, 21.0, 0.1, 0.2],
+            noise: crate::noise::Noise::unit(1),
+            deviance: 0.0,
+            criterion: 0.0,
+        };
+        let with = made.from(&fit, 1);
+        let expected = [1.0, 0.2, 10.0, 11.0, 3.0, 20.0, 21.0, 7.0, 0.1, 0.2];
+        assert_eq!(with.point, expected);
+        assert_eq!(made.without(&with, 1).point, fit.point);
+    }
+
     /// With a short time constant and within wide limits a sensor shows what the equations say, also where that is a sum.
     #[test]
     fn a_sensor_of_a_sum_shows_the_sum() {

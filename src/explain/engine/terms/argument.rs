@@ -4,7 +4,9 @@ use crate::physics::{
     Binary, Equation, ExpressionId, ModelSpec, Node, Unknown, VariableId, VariableKind,
 };
 
-use crate::explain::engine::terms::names::{is_velocity, may_be_angle, may_be_velocity};
+use crate::explain::engine::terms::names::{
+    is_position, is_velocity, may_be_angle, may_be_velocity,
+};
 use crate::explain::engine::terms::term::Needs;
 
 /// How an argument is made of variables.
@@ -32,6 +34,7 @@ pub(crate) struct Argument {
     pub(crate) rate: Option<String>,
     pub(crate) angle: bool,
     pub(crate) velocity: bool,
+    pub(crate) position: bool,
     /// Changes at samples only: it is made of inputs.
     pub(crate) held: bool,
     /// Values along each recording.
@@ -68,6 +71,7 @@ impl Argument {
                         .all(|&v| spec.variable(v).kind != VariableKind::Input),
             angle: variables.len() == 1
                 && (unit(variables[0]) == "rad" || may_be_angle(spec, &variables)),
+            position: is_position(spec, &variables),
             is_difference: variables.len() == 1 && moves_apart(spec, variables[0]),
             rate: rate(spec, &variables),
             held,
@@ -154,6 +158,7 @@ impl Argument {
             Needs::Positive => self.quantile(0.0) >= 0.0,
             Needs::Radiation => self.form == ArgumentForm::Radiation,
             Needs::Difference => self.form == ArgumentForm::Difference || self.is_difference,
+            Needs::Stretch => self.position && self.serves(Needs::Difference),
             Needs::Angle => self.angle,
             Needs::Velocity => both && self.velocity,
             Needs::OwnState => self.form == ArgumentForm::Variable && !self.held,

@@ -11,7 +11,7 @@ const TIMES: &[f64] = &[
 ];
 
 use Needs::{
-    Angle, Anything, BothSigns, Difference, OwnState, Positive, Radiation, Time, Velocity,
+    Angle, Anything, BothSigns, Difference, OwnState, Positive, Radiation, Stretch, Time, Velocity,
 };
 use Port::{Equation, Input, Parameter, Sensor};
 
@@ -199,7 +199,7 @@ pub(crate) const TERMS: &[Term] = &[
     curve(
         "gap",
         Equation,
-        Difference,
+        Stretch,
         "min(max({z}, -{g}), {g})",
         &[shape("g", Starts::SizeQuantiles(&[0.3, 0.6, 0.9]), true)],
     ),

@@ -79,6 +79,11 @@ pub(in crate::explain::engine) fn may_be_angle(spec: &ModelSpec, variables: &[Va
     is_without_units(spec) && kind(spec, variables) == Kind::Position
 }
 
+/// Whether all of these are positions.
+pub(in crate::explain::engine) fn is_position(spec: &ModelSpec, variables: &[VariableId]) -> bool {
+    kind(spec, variables) == Kind::Position
+}
+
 /// Whether all of these are velocities.
 pub(in crate::explain::engine) fn is_velocity(spec: &ModelSpec, variables: &[VariableId]) -> bool {
     kind(spec, variables) == Kind::Velocity

@@ -26,6 +26,8 @@ pub(crate) enum Needs {
     Radiation,
     /// A difference of two variables of one unit.
     Difference,
+    /// Such a difference of positions: what a spring is stretched by.
+    Stretch,
     /// An angle.
     Angle,
     /// A velocity of both signs.

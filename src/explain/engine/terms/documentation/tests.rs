@@ -57,6 +57,7 @@ fn names() -> BTreeSet<&'static str> {
                     let serves = match term.needs {
                         Needs::Radiation => argument.form == ArgumentForm::Radiation,
                         Needs::Difference => argument.form == ArgumentForm::Difference,
+                        Needs::Stretch => argument.serves(Needs::Stretch),
                         Needs::Angle => argument.angle,
                         _ => true,
                     };
