@@ -5,6 +5,7 @@ mod location;
 mod plant_effects;
 mod plant_summary;
 mod question;
+mod significance;
 mod simulate_explained;
 mod stated_probability;
 mod where_to_look;
@@ -16,6 +17,7 @@ pub use simulate_explained::{AugmentedPlantError, Original};
 use nalgebra::DMatrix;
 
 use self::plant_summary::as_good;
+use self::significance::differ_from_zero;
 use self::stated_probability::probability;
 use self::where_to_look::experiment;
 use self::within_bounds::within_bounds;
@@ -32,7 +34,7 @@ use super::engine::terms::term::Port;
 use super::engine::thresholds::{LEFT, SURE, chance};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
-    FitTable, NoiseFound, ParameterChange, Quantity, Remaining, SignalTraces, Verdict,
+    FitTable, NoiseFound, ParameterChange, Remaining, SignalTraces, Verdict,
 };
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
@@ -42,8 +44,6 @@ use crate::physics::{Hold, ModelSpec, Plant, Span, units_in_words};
 
 /// A parameter is said to differ from the text where it does by so many standard deviations.
 const DIFFERENT: f64 = 3.3;
-/// Standard deviations from 0 of a parameter that is not 0 with 95 % confidence.
-const NOT_ZERO: f64 = 1.96;
 /// Points of a picture.
 const TRACE_POINTS: usize = 1500;
 
@@ -129,12 +129,6 @@ fn level(recorded: &[f64]) -> Vec<f64> {
     vec![sum / f64::from(count.max(1)); recorded.len()]
 }
 
-/// Whether a recording tells one of an effect's parameters from 0.
-fn is_determined(effect: &EffectFound) -> bool {
-    let differs = |q: &Quantity| q.std.is_some_and(|std| q.value.abs() > NOT_ZERO * std);
-    effect.parameters.values().any(differs)
-}
-
 fn figure(recorded: &[f64], simulated: &[f64]) -> FitFigure {
     let pairs: Vec<(f64, f64)> = recorded
         .iter()
@@ -182,12 +176,12 @@ impl Answer<'_> {
         let adequate = p_value >= CHANCE;
         // Of a plant that follows worse than the mean most terms take half the error: what is found must follow. A plant that
         // does not run freely has no blocks that say so.
-        let (follows, explains) = match &self.found.held_out {
-            None => (true, false),
+        let (follows, explains, relied_on) = match &self.found.held_out {
+            None => (true, false, true),
             Some([without, with]) => {
                 let closely = with.follows_closely();
                 let removes = with.removed(without) >= EXPLAINED;
-                (without.follows() || closely, removes && closely)
+                (without.follows() || closely, removes && closely, removes)
             }
         };
         let effects: Vec<EffectFound> = self
@@ -200,7 +194,7 @@ impl Answer<'_> {
         let curves = effects.iter().any(|e| e.effect == "law");
         let sure = (gain >= SURE || best.is_some_and(|b| b.proved))
             && follows
-            && effects.iter().all(is_determined)
+            && self.effects().all(|fitted| self.is_significant(fitted))
             && (adequate || explains && !curves);
         let verdict = if self.found.accepted > 0 && sure {
             Verdict::Named
@@ -266,6 +260,14 @@ impl Answer<'_> {
             (&train, held_out.as_ref()),
             p_value,
         );
+        // What is not sure predicts a fresh recording only where it has explained blocks left out.
+        let relied_on = verdict != Verdict::Unexplained || effects.is_empty() || relied_on;
+        if !relied_on {
+            summary.push(
+                "It is not sure enough to predict with: `simulate` uses the equations without it."
+                    .to_owned(),
+            );
+        }
         if !runs {
             summary.push(
                 "The equations cannot be simulated over the recording with the values of the text; the mean of the recording stands for them."
@@ -329,11 +331,14 @@ impl Answer<'_> {
             curve: None,
             model: None,
             plant: Some(AugmentedPlant {
-                modelica: self.text(),
+                modelica: self.text(relied_on),
                 outputs: self.channels.clone(),
                 simulation: None,
                 simulated_inputs: vec![],
-                times_of_change: self.times_of_change(),
+                times_of_change: match relied_on {
+                    true => self.times_of_change(),
+                    false => vec![],
+                },
                 hold: if self.hold == Hold::Zero {
                     "zero"
                 } else {
@@ -348,8 +353,18 @@ impl Answer<'_> {
         }
     }
 
-    /// The plant with what was found, as it ran over the first recording. A fresh recording starts elsewhere: no start is certain.
-    fn text(&self) -> String {
+    fn is_significant(&self, fitted: &Fitted) -> bool {
+        let places: Vec<usize> = self.parameters_of(fitted).map(|(_, at)| at).collect();
+        let hypothesis = fitted.hypothesis.is_some();
+        hypothesis || differ_from_zero(&self.found.fit.point, &self.within_bounds, &places)
+    }
+
+    /// The plant as it ran over the first recording, with what was found where that may be relied on. A fresh recording starts elsewhere:
+    /// no start is certain.
+    fn text(&self, relied_on: bool) -> String {
+        if !relied_on {
+            return (self.plant).text_at(&self.base.points(&self.found.baseline)[0]);
+        }
         let point = &self.whole.points(&self.found.fit)[0];
         let free = with_free_states(&self.found.plant);
         free.as_ref().unwrap_or(&self.found.plant).text_at(point)

@@ -109,7 +109,7 @@ impl Answer<'_> {
     }
 
     /// The parameters of an effect, with their positions among those of the whole plant.
-    fn parameters_of<'f>(
+    pub(super) fn parameters_of<'f>(
         &'f self,
         fitted: &'f Fitted,
     ) -> impl Iterator<Item = (&'f String, usize)> + 'f {
