@@ -79,6 +79,7 @@ pub fn explain_plant(
         found: &found,
         hypotheses: &scope.hypotheses,
         units: units_in_words(&found.plant.spec),
+        inputs: logs.first().map_or_else(Vec::new, |log| log.inputs.clone()),
         channels: logs
             .first()
             .map_or_else(Vec::new, |log| log.outputs.clone()),
@@ -94,6 +95,7 @@ struct Answer<'a> {
     hold: Hold,
     found: &'a Found,
     hypotheses: &'a [Hypothesis],
+    inputs: Vec<Channel>,
     channels: Vec<Channel>,
     /// Of every variable of the plant with its effects.
     units: Vec<Option<String>>,
@@ -323,6 +325,7 @@ impl Answer<'_> {
                     .found
                     .plant
                     .text_at(&self.whole.points(&self.found.fit)[0]),
+                inputs: self.inputs.clone(),
                 outputs: self.channels.clone(),
                 simulation: None,
                 simulated_inputs: vec![],
