@@ -224,11 +224,17 @@ fn other_names(
     };
     let flags = [flag("--inputs", inputs), flag("--outputs", outputs)];
     let flags: Vec<String> = flags.into_iter().flatten().collect();
-    anyhow::anyhow!(
+    let said = format!(
         "{error}; where the file has other names than the plant, list its columns with {}, in this order",
         flags.join(" and with ")
-    )
+    );
+    OtherNames(said).into()
 }
+
+/// A recording that has other names than the plant.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(super) struct OtherNames(String);
 
 /// `name=value` pairs, separated by commas.
 pub(super) fn assignments(flag: &str, text: &str) -> anyhow::Result<Vec<(String, f64)>> {

@@ -3,15 +3,15 @@
 use std::path::Path;
 
 use super::load_plant::{
-    LoadedPlant, all_known, assignments, channels, load, named, read_channels, read_with,
-    set_parameters, set_start, tell_warnings,
+    LoadedPlant, OtherNames, all_known, assignments, channels, load, named, read_channels,
+    read_with, set_parameters, set_start, tell_warnings,
 };
 use super::units_of_logs::Channels;
 use crate::cli::flags::RoleFlags;
 use crate::cli::terminal::note;
 use crate::cli::{Outcome, Verbosity};
 use crate::explain::AugmentedPlant;
-use crate::log::{Channel, Log, LogError, RoleNeed, Roles, Source, write_table};
+use crate::log::{Channel, Log, RoleNeed, Roles, Source, write_table};
 use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
 use crate::physics::{Hold, Point};
 use crate::report::{PlantDocument, is_plant};
@@ -78,10 +78,12 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         };
         let by_plant = of(&columns);
         match (&remembered, by_plant) {
-            (Some(names), Err(error)) if !asked.roles.names_columns() => {
-                of(names).map_err(|other| match other.downcast_ref::<LogError>() {
-                    Some(LogError::UnknownColumn { .. }) => error,
-                    _ => other,
+            (Some(names), Err(error))
+                if error.is::<OtherNames>() && !asked.roles.names_columns() =>
+            {
+                of(names).map_err(|other| match other.is::<OtherNames>() {
+                    true => error,
+                    false => other,
                 })
             }
             (_, by_plant) => by_plant,

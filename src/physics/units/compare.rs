@@ -100,7 +100,13 @@ pub(crate) fn compare(one: &str, other: &str) -> Comparison {
 pub(crate) fn slow_time(text: &str) -> Option<&'static str> {
     let symbols = text.split(|c: char| !c.is_alphabetic());
     symbols
-        .filter_map(|s| ["min", "h", "hr", "d", "day"].into_iter().find(|t| *t == s))
+        .filter_map(|s| {
+            let hours = s.ends_with("Wh") || s.ends_with("Ah");
+            let symbol = if hours { "h" } else { s };
+            ["min", "h", "hr", "d", "day"]
+                .into_iter()
+                .find(|t| *t == symbol)
+        })
         .next()
 }
 
@@ -132,7 +138,7 @@ fn between(a: &Reading, b: &Reading) -> Option<Comparison> {
     }
     Some(match a.zero - b.zero {
         0.0 => Comparison::Alike,
-        offset => Comparison::Offset(offset),
+        offset => Comparison::Offset(offset / b.sized.size),
     })
 }
 

@@ -54,6 +54,12 @@ fn converts_time(factor: f64) -> bool {
         .any(|c| power_of_ten(factor / c) || power_of_ten(factor * c))
 }
 
+/// Whether a number of the text may convert times, perhaps with a thousand: 3600, 3.6.
+fn is_conversion(number: f64) -> bool {
+    let is = |expected: f64| (number / expected - 1.0).abs() < ROUNDED;
+    CLOCKS.iter().any(|c| is(*c) || is(c * 1e3) || is(c * 1e-3))
+}
+
 fn conflict(spec: &ModelSpec, found: &SizeConflict) -> Option<OtherClock> {
     let slow = found.parts.map(|part| slow_variables(spec, part));
     // The side that is in hours, the right one where both are.
@@ -141,7 +147,7 @@ fn unconverted(spec: &ModelSpec) -> Option<OtherClock> {
     // Hours that are no time constants: a clock.
     let clock = |&v: &VariableId| spec.variable(v).kind != VariableKind::Parameter && time(v);
     let mut all = (0..spec.variables.len()).map(|i| VariableId(i as u32));
-    if all.any(|v| clock(&v)) || numbers(&spec.text).any(|n| n != 1.0 && converts_time(n)) {
+    if all.any(|v| clock(&v)) || numbers(&spec.text).any(is_conversion) {
         return None;
     }
     let (equation, v) = spec.equations.iter().find_map(|e| {
@@ -216,6 +222,11 @@ mod tests {
         for (variables, equations, words) in [
             (
                 "parameter Real C(unit=\"kW.h/K\") = 5; input Real P(unit=\"kW\"); output Real T(unit=\"K\");",
+                "C*der(T) = P;",
+                "`C*der(T)`: multiply it by 3600",
+            ),
+            (
+                "parameter Real C(unit=\"kWh/K\") = 5; input Real P(unit=\"kW\"); output Real T(unit=\"K\");",
                 "C*der(T) = P;",
                 "`C*der(T)`: multiply it by 3600",
             ),
