@@ -6,7 +6,9 @@ use clap::Args;
 
 use super::align::aligned;
 use super::flags::{RoleFlags, tell_reading};
-use super::plant::{HoldFlag, is_plant_file, load, read_recordings, tell_warnings};
+use super::plant::{
+    HoldFlag, channels, is_plant_file, load, read_recordings, tell_warnings, units_of_logs,
+};
 use super::terminal::{Output, check_distinct, note, paths, print};
 use super::{Outcome, Verbosity};
 use crate::explain::{
@@ -116,8 +118,13 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     }
     let roles = flags.roles.clone().roles();
     let mut readings: Vec<Reading> = Vec::with_capacity(flags.logs.len());
+    // Columns may be those of a free decay; a linear model has inputs.
+    let need = match flags.simulation.iter().any(|f| is_json(f)) {
+        true => RoleNeed::Identify,
+        false => RoleNeed::OutputsAndMaybeInputs,
+    };
     for source in &flags.logs {
-        let reading = Reading::read(source, &roles, RoleNeed::Identify)?;
+        let reading = Reading::read(source, &roles, need)?;
         tell_reading(&source.to_string(), reading.said.as_deref(), say);
         if let (Some(first), Some(log)) = (
             readings.first().and_then(|r| r.logs.first()),
@@ -165,8 +172,14 @@ fn of_plant(flags: &Flags, plant: &Path, say: Verbosity) -> anyhow::Result<Expla
         without: flags.without.clone(),
         hypotheses: hypotheses(&flags.hypothesis, &at_values.spec)?,
     };
-    explain_plant(&at_values, &logs, recordings, &options)
-        .map_err(|e| anyhow::anyhow!("{}: {e}", plant.display()))
+    let mut explanation = explain_plant(&at_values, &logs, recordings, &options)
+        .map_err(|e| anyhow::anyhow!("{}: {e}", plant.display()))?;
+    // What may make the whole answer wrong comes first.
+    let units = units_of_logs(&at_values.spec, &channels(&at_values), &logs)?;
+    let doubts = loaded.clock.into_iter().chain(units);
+    let doubts: Vec<String> = doubts.map(|d| format!("Warning: {d}.")).collect();
+    explanation.summary.splice(0..0, doubts);
+    Ok(explanation)
 }
 
 /// Reads hypotheses, given as they are or in files.
@@ -233,6 +246,11 @@ fn tell(
     })
 }
 
+fn is_json(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("json"))
+}
+
 /// Whether the simulation lacks something.
 fn missing(explanation: &Explanation) -> bool {
     !matches!(explanation.verdict, Verdict::Consistent)
@@ -246,10 +264,6 @@ fn simulation(
     say: Verbosity,
 ) -> anyhow::Result<(Vec<Log>, Simulation)> {
     let files = &flags.simulation;
-    let is_json = |path: &Path| {
-        path.extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("json"))
-    };
     if files.iter().any(|f| is_json(f)) {
         if let [file] = files.as_slice() {
             let model = read_model(file)?.model;

@@ -120,12 +120,7 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     }
     let estimate = flags.estimate()?;
     let roles = flags.roles.of_model(&model.inputs, &model.outputs)?;
-    let need = if estimate {
-        RoleNeed::InputsAndMaybeOutputs
-    } else {
-        RoleNeed::InputsOnly
-    };
-    let log = read(&flags.input, &roles, need, say)?;
+    let (log, beginning) = read_inputs(&flags.input, &roles, estimate, say)?;
     check_sampling(&name, &model, &log)?;
     if log.input_data.len() != model.inputs.len() {
         // Roles that need not be there are left out when they are not.
@@ -137,8 +132,8 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         );
     }
     let inputs: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
-    let start = if estimate {
-        Some(initial_state(&model, &log, &inputs)?)
+    let start = if let Some(beginning) = &beginning {
+        Some(initial_state(&model, beginning)?)
     } else {
         None
     };
@@ -172,6 +167,43 @@ fn read(source: &Source, roles: &Roles, need: RoleNeed, say: Verbosity) -> anyho
     Ok(reading.whole()?)
 }
 
+/// Inputs without gaps, and where the initial state is to be estimated, the beginning of the recording with its outputs, which may be
+/// missing later on.
+fn read_inputs(
+    source: &Source,
+    roles: &Roles,
+    estimate: bool,
+    say: Verbosity,
+) -> anyhow::Result<(Log, Option<Log>)> {
+    if !estimate {
+        return Ok((read(source, roles, RoleNeed::InputsOnly, say)?, None));
+    }
+    if !source.can_be_reopened() {
+        let log = read(source, roles, RoleNeed::InputsAndMaybeOutputs, say)?;
+        return Ok((log.clone(), Some(log)));
+    }
+    let log = read(source, roles, RoleNeed::InputsOnly, say)?;
+    let parts = Reading::read(source, roles, RoleNeed::InputsAndMaybeOutputs)?;
+    let part = parts.logs.into_iter().next();
+    let beginning = part.filter(|p| (p.start_time - log.start_time).abs() < 0.5 * log.sample_time);
+    let Some(beginning) = beginning else {
+        anyhow::bail!(
+            "{}: --initial-state estimate needs the outputs of the first rows, and they are missing; cut these rows, or start from \
+             --initial-state zero",
+            log.name
+        );
+    };
+    if beginning.samples() < log.samples() && !say.quiet {
+        note(&format!(
+            "{}: the initial state is estimated from the {} samples up to the first one without outputs; all {} are simulated\n",
+            log.name,
+            beginning.samples(),
+            log.samples()
+        ));
+    }
+    Ok((log, Some(beginning)))
+}
+
 /// The explanation in `path`, if that is one; `-` and unreadable files are left to the reader of models.
 fn explanation(path: &Path) -> anyhow::Result<Option<Explanation>> {
     match std::fs::read_to_string(path) {
@@ -201,24 +233,20 @@ fn simulate_explanation(
     let outputs: Vec<IdentifiedChannel> = model.outputs.iter().map(channel).collect();
     let estimate = flags.estimate()?;
     let roles = flags.roles.of_model(&inputs, &outputs)?;
-    let need = if estimate {
-        RoleNeed::InputsAndMaybeOutputs
-    } else {
-        RoleNeed::InputsOnly
-    };
-    let log = read(&flags.input, &roles, need, say)?;
+    let (log, beginning) = read_inputs(&flags.input, &roles, estimate, say)?;
     check_same_sampling(&name, model.sample_time, &log.name, log.sample_time)?;
     let columns: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
-    let start = if estimate {
-        if log.output_data.len() != model.outputs.len() {
+    let start = if let Some(beginning) = &beginning {
+        if beginning.output_data.len() != model.outputs.len() {
             anyhow::bail!(
                 "{}: --initial-state estimate needs the recorded outputs in this file; name them with --outputs, or start \
                  from --initial-state zero",
                 log.name
             );
         }
-        let recorded: Vec<&[f64]> = log.output_data.iter().map(Vec::as_slice).collect();
-        Some(model.estimate_initial_state(&columns, &recorded)?)
+        let inputs: Vec<&[f64]> = beginning.input_data.iter().map(Vec::as_slice).collect();
+        let recorded: Vec<&[f64]> = beginning.output_data.iter().map(Vec::as_slice).collect();
+        Some(model.estimate_initial_state(&inputs, &recorded)?)
     } else {
         None
     };
@@ -265,7 +293,7 @@ fn simulate_explanation(
     Ok(Outcome::Done)
 }
 
-fn initial_state(model: &Model, log: &Log, inputs: &[&[f64]]) -> anyhow::Result<DVector<f64>> {
+fn initial_state(model: &Model, log: &Log) -> anyhow::Result<DVector<f64>> {
     if log.output_data.len() != model.outputs.len() {
         let wanted: Vec<String> = model
             .outputs
@@ -279,6 +307,7 @@ fn initial_state(model: &Model, log: &Log, inputs: &[&[f64]]) -> anyhow::Result<
             wanted.join(", ")
         );
     }
+    let inputs: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
     let outputs: Vec<&[f64]> = log.output_data.iter().map(Vec::as_slice).collect();
-    Ok(model.initial_state_of(inputs, &outputs)?)
+    Ok(model.initial_state_of(&inputs, &outputs)?)
 }

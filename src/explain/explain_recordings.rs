@@ -11,7 +11,7 @@ use super::linear::data::Data;
 use super::linear::decision::averaged_decision::attempt;
 use super::linear::decision::output_error_decision::{Finding, inquire};
 use super::linear::known::Known;
-use super::linear::known_simulation::{Simulator, know};
+use super::linear::known_simulation::{Simulator, check, know};
 use super::linear::nonlinear_simulator::NonlinearSimulator;
 use super::linear::screening::output_adequacy::LEVEL;
 use super::memory;
@@ -50,6 +50,10 @@ pub fn explain(
         }
     }
     memory::check(recordings)?;
+    let free = recordings.first().is_some_and(|r| r.inputs.is_empty());
+    if free && matches!(simulation, Simulation::Outputs(_)) {
+        return explain_free(recordings, simulation, options);
+    }
     let allowed_id = |id: &str| !options.without.iter().any(|without| without == id);
     // A law of one unit is not tried on what no output is measured in.
     let outputs = &recordings.first().ok_or(ExplainError::NoRecording)?.outputs;
@@ -113,6 +117,41 @@ fn explain_linear(
         (None, None) => return Err(no_fit(checked)),
     };
     Ok(said(&known, checked, (finding, mask), seed))
+}
+
+/// A free decay: no linear model has states that its inputs do not reach, so that equations are the only way.
+fn explain_free(
+    recordings: &[Log],
+    simulation: &Simulation,
+    options: &Options,
+) -> Result<Explanation, ExplainError> {
+    check(recordings, simulation)?;
+    let checked = Checked {
+        recordings: recordings.to_vec(),
+        simulation: simulation.clone(),
+        troubles: Vec::new(),
+        interpolated: false,
+    };
+    let equations = columns::equations(&checked);
+    let found = equations.as_ref().and_then(|e| {
+        let mut explanation = columns::explain_equations(e, &checked, &options.without)?;
+        if e.misfit > columns::REPRODUCED && !explanation.remaining.adequate {
+            doubt(&mut explanation);
+        }
+        Some(explanation)
+    });
+    let sensors = columns::explain_sensors(&checked, &options.without);
+    let found = match (found, sensors) {
+        (Some(equations), Some(sensors)) if stands_in(&sensors, &equations) => Some(sensors),
+        (equations, sensors) => equations.or(sensors),
+    };
+    let name = || match simulation {
+        Simulation::Outputs(logs) => logs.first().map(|log| log.name.clone()),
+        Simulation::Model(_, name) => Some(name.clone()),
+    };
+    found.ok_or_else(|| ExplainError::NoEquations {
+        name: name().unwrap_or_default(),
+    })
 }
 
 fn explain_nonlinear(

@@ -153,6 +153,9 @@ pub struct AugmentedPlant {
     pub modelica: String,
     /// How its inputs behave between samples.
     pub hold: String,
+    /// Its inputs as the recordings call them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inputs: Vec<Channel>,
     /// Its outputs as the recordings call them.
     pub outputs: Vec<Channel>,
     /// Equations that reproduce the simulated outputs, where only these were given: its parameters are those of the simulation.

@@ -127,8 +127,9 @@ impl std::fmt::Display for TimeUnit {
     }
 }
 
-/// What `--time` says when no column is to be read as the time.
+/// What `--time` says when no column is to be read as the time, and `--inputs` when there are none.
 pub(super) const NO_TIME: &str = "none";
+const NO_INPUTS: &str = "none";
 
 impl Roles {
     /// Inputs and outputs by name, as a model names them.
@@ -147,6 +148,14 @@ impl Roles {
     fn is_timeless(&self, header: &Header) -> Result<bool, LogError> {
         Ok(self.time.as_deref() == Some(NO_TIME) && find(header, NO_TIME)?.is_none())
     }
+
+    /// Whether there are no inputs: `--inputs none`, unless a column is called so.
+    fn is_free(&self, header: &Header) -> Result<bool, LogError> {
+        let asked = self.inputs.as_deref();
+        let is_none = |name: &String| matches!(name.trim(), NO_INPUTS | "");
+        let none = asked.is_some_and(|names| names.iter().all(is_none));
+        Ok(none && find(header, NO_INPUTS)?.is_none())
+    }
 }
 
 /// Which roles the caller cannot do without.
@@ -161,6 +170,8 @@ pub enum RoleNeed {
     OutputsOnly,
     /// Inputs, and the outputs if the file has all of them: one that is missing means that none is read.
     InputsAndMaybeOutputs,
+    /// Outputs, and the inputs if there are any: none where they are called `none`, and where no column is left for them.
+    OutputsAndMaybeInputs,
 }
 
 /// Indices of the columns with a role.
@@ -186,8 +197,16 @@ pub(super) fn assign(roles: &Roles, need: RoleNeed, header: &Header) -> Result<A
     let wants_inputs = need != RoleNeed::OutputsOnly;
     let wants_outputs = need != RoleNeed::InputsOnly;
 
-    let mut inputs = asked_columns(header, roles.inputs.as_deref(), wants_inputs)?;
-    let strict = need == RoleNeed::Identify || need == RoleNeed::OutputsOnly;
+    let maybe_inputs = need == RoleNeed::OutputsAndMaybeInputs;
+    let mut inputs = match maybe_inputs && roles.is_free(header)? {
+        true => Some(Vec::new()),
+        false => asked_columns(header, roles.inputs.as_deref(), wants_inputs)?,
+    };
+    let free_of_inputs = inputs.as_ref().is_some_and(Vec::is_empty);
+    let strict = matches!(
+        need,
+        RoleNeed::Identify | RoleNeed::OutputsOnly | RoleNeed::OutputsAndMaybeInputs
+    );
     let mut outputs = asked_columns(header, roles.outputs.as_deref(), strict)?;
     if need == RoleNeed::InputsAndMaybeOutputs {
         let asked = roles.outputs.as_ref().map_or(0, Vec::len);
@@ -232,7 +251,9 @@ pub(super) fn assign(roles: &Roles, need: RoleNeed, header: &Header) -> Result<A
 
     let (no_inputs, no_outputs) = (inputs.is_empty(), outputs.is_empty());
     match need {
-        RoleNeed::Identify if no_inputs && no_outputs => return Err(no_roles(header, time, need)),
+        RoleNeed::Identify | RoleNeed::OutputsAndMaybeInputs if no_inputs && no_outputs => {
+            return Err(no_roles(header, time, need));
+        }
         RoleNeed::InputsOnly | RoleNeed::InputsAndMaybeOutputs
             if no_inputs && roles.inputs.is_none() =>
         {
@@ -244,11 +265,17 @@ pub(super) fn assign(roles: &Roles, need: RoleNeed, header: &Header) -> Result<A
         _ => {}
     }
     let (name, headers) = (header.name.clone(), header.list());
-    if wants_inputs && no_inputs {
+    let is_left = |index: usize| !outputs.contains(&index) && Some(index) != time;
+    let left = (0..header.channels.len()).any(is_left);
+    if wants_inputs && no_inputs && !(maybe_inputs && (free_of_inputs || !left)) {
+        let example = match maybe_inputs {
+            true => "--inputs a,b`, or say that there are none: `--inputs none",
+            false => "--inputs a,b",
+        };
         return Err(LogError::NoInputs {
             name,
             headers,
-            example: "--inputs a,b".to_owned(),
+            example: example.to_owned(),
         });
     }
     if strict && no_outputs {
@@ -462,7 +489,12 @@ fn no_roles(header: &Header, time: Option<usize>, need: RoleNeed) -> LogError {
         _ => ("a,b".to_owned(), "c".to_owned()),
     };
     example.push_str(&match need {
-        RoleNeed::Identify => format!("--inputs {} --outputs {}", quote(&inputs), quote(&output)),
+        RoleNeed::OutputsAndMaybeInputs if names.len() == 1 => {
+            format!("--outputs {}", quote(names[0]))
+        }
+        RoleNeed::Identify | RoleNeed::OutputsAndMaybeInputs => {
+            format!("--inputs {} --outputs {}", quote(&inputs), quote(&output))
+        }
         RoleNeed::OutputsOnly => format!("--outputs {}", quote(&output)),
         RoleNeed::InputsOnly | RoleNeed::InputsAndMaybeOutputs => {
             format!("--inputs {}", quote(&inputs))

@@ -1,7 +1,9 @@
-//! Units: products of powers of the seven base units. Factors (milli, hour, degree) are left out, only dimensions count.
+//! Units: products of powers of the seven base units. In a [`Unit`] only dimensions count; `compare` and `seconds` know factors (milli, hour, degree).
 
 mod check;
+mod compare;
 mod infer;
+mod seconds;
 mod symbols;
 #[cfg(test)]
 mod tests;
@@ -11,7 +13,9 @@ mod words;
 
 pub use check::check_units;
 pub(crate) use check::unit_conflicts;
+pub(crate) use compare::{Comparison, compare, rounded};
 pub(crate) use infer::units_in_words;
+pub(crate) use seconds::other_clock;
 pub(crate) use types::type_unit;
 pub use unknown::{UnknownUnit, unknown_units};
 
@@ -71,7 +75,7 @@ impl Unit {
 
     /// Reads a unit in Modelica's notation, such as `kg.m2/(s3.A)`. None where a part of it is not known.
     pub fn parse(text: &str) -> Option<Self> {
-        symbols::parse(text.trim())
+        symbols::parse(text.trim()).map(|found| found.unit)
     }
 
     /// Unit of a product.

@@ -189,6 +189,112 @@ fn units_that_contradict() {
 }
 
 #[test]
+fn units_that_are_only_spelled_differently() {
+    let folder = Folder::new();
+    let s = signals(SAMPLES);
+    folder.text(
+        "recording.csv",
+        &table("t,u1 [V],y1 [ls-1]", DT, &[&s.u, &s.y]),
+    );
+    for unit in ["l/s", "l s^-1", "counts"] {
+        let header = format!("t,y1 [{unit}]");
+        folder.text("simulated.csv", &table(&header, DT, &[&s.simulated]));
+        let arguments = [
+            "explain",
+            "recording.csv",
+            "--simulation",
+            "simulated.csv",
+            "-o",
+            "e.json",
+        ];
+        folder.run(&arguments).ok();
+    }
+}
+
+/// A car that coasts: speed under rolling resistance and drag.
+fn coasting(drag: f64) -> Vec<f64> {
+    let mut v = 8.0;
+    let fine = 100;
+    (0..200)
+        .map(|_| {
+            let now = v;
+            for _ in 0..fine {
+                v -= (0.02 + drag * v * v) / f64::from(fine);
+            }
+            now
+        })
+        .collect()
+}
+
+#[test]
+fn a_free_decay_has_no_inputs() {
+    let folder = Folder::new();
+    let noisy: Vec<f64> = coasting(8e-4)
+        .iter()
+        .enumerate()
+        .map(|(k, v)| v + 0.01 * (7.3 * (k * k % 97) as f64).sin())
+        .collect();
+    let simulated = coasting(0.0);
+    folder.text("coast.csv", &table("t,speed [m/s]", 1.0, &[&noisy]));
+    folder.text("simulated.csv", &table("t,speed", 1.0, &[&simulated]));
+    let plain = [
+        "explain",
+        "coast.csv",
+        "--simulation",
+        "simulated.csv",
+        "--outputs",
+        "speed",
+        "-o",
+        "e.json",
+    ];
+    folder.run(&plain).ok();
+    let found = json(&folder.join("e.json"));
+    assert_ne!(found["verdict"], "consistent", "{}", found["summary"]);
+    assert!(
+        found["plant"]["modelica"].is_string(),
+        "{}",
+        found["summary"]
+    );
+    folder
+        .run(&["simulate", "e.json", "coast.csv", "-o", "out.csv"])
+        .ok();
+
+    // A further column may be an input.
+    let zeros = vec![0.0; 200];
+    folder.text("brake.csv", &table("t,brake,speed", 1.0, &[&zeros, &noisy]));
+    let arguments = [
+        "explain",
+        "brake.csv",
+        "--simulation",
+        "simulated.csv",
+        "--outputs",
+        "speed",
+    ];
+    let message = folder.run(&arguments).error();
+    says(&message, &["brake.csv: no inputs", "`--inputs none`"]);
+    folder
+        .run(&[&arguments[..], &["--inputs", "none", "-o", "e.json"]].concat())
+        .ok();
+}
+
+#[test]
+fn an_input_that_never_changes_is_named() {
+    let folder = Folder::new();
+    let s = signals(SAMPLES);
+    let rest = vec![1.0; SAMPLES];
+    folder.text("recording.csv", &table("t,u1,y1", DT, &[&rest, &s.y]));
+    folder.text("simulated.csv", &table("t,y1", DT, &[&s.simulated]));
+    says(
+        &about(&folder, &["recording.csv"], &["simulated.csv"], &[]),
+        &[
+            "no dynamic model",
+            "the input `u1` never changes",
+            "--inputs none",
+        ],
+    );
+}
+
+#[test]
 fn recordings_that_say_too_little() {
     let folder = good();
     let s = signals(100);

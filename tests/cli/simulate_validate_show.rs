@@ -326,3 +326,151 @@ fn a_reader_that_leaves_is_no_error() {
     assert_eq!(output.stdout, b"t [s],y1\n");
     assert_eq!(output.stderr, b"");
 }
+
+const LAG: &str = "model Lag parameter Real tau(unit=\"s\", min=1, max=100) = 10;
+  input Real u(unit=\"W\"); output Real y(unit=\"m/s\"); Real x(unit=\"m/s\", start=0);
+equation tau*der(x) = 0.01*u - x; y = x; end Lag;
+";
+
+/// A step through the lag; the outputs from `known` on are missing.
+fn step(header: &str, scale: f64, known: usize) -> String {
+    let mut text = format!("{header}\n");
+    for k in 0..100 {
+        let y = 1.0 - (-(k as f64) / 10.0).exp() + 0.01 * (7.3 * k as f64).sin();
+        let y = match k < known {
+            true => (scale * y).to_string(),
+            false => String::new(),
+        };
+        text += &format!("{k},100,{y}\n");
+    }
+    text
+}
+
+#[test]
+fn a_log_in_another_scale_than_the_plant_is_refused() {
+    let folder = Folder::new();
+    folder.text("lag.mo", LAG);
+    folder.text("kmh.csv", &step("t,u [W],y [km/h]", 3.6, 100));
+    let explain = ["explain", "kmh.csv", "--simulation", "lag.mo"];
+    let identify = ["identify", "kmh.csv", "--structure", "lag.mo"];
+    for arguments in [&explain, &identify] {
+        let message = folder.run(arguments).error();
+        assert!(message.contains("column `y` is in km/h"), "{message}");
+        assert!(message.contains("1 m/s is 3.6 km/h"), "{message}");
+        assert!(message.contains("divide the column by 3.6"), "{message}");
+    }
+    // Other spellings of the same unit, and those that nobody knows.
+    for header in ["t,u [W],y [ms-1]", "t,u [watt],y [counts]"] {
+        folder.text("alike.csv", &step(header, 1.0, 100));
+        let run = folder.run(&["simulate", "lag.mo", "alike.csv", "-o", "out.csv"]);
+        assert!(!run.stderr.contains("column"), "{}", run.stderr);
+        run.ok();
+    }
+    // Another quantity may be misread: a warning, also in the explanation.
+    folder.text("volts.csv", &step("t,u [V],y [m/s]", 1.0, 100));
+    let run = folder.run(&["explain", "volts.csv", "--simulation", "lag.mo"]);
+    let words = "column `u` is in V, and `u` of the plant in W, which is another quantity";
+    assert!(run.stderr.contains(words), "{}", run.stderr);
+    assert!(run.stdout.contains("Warning: volts.csv"), "{}", run.stdout);
+}
+
+#[test]
+fn a_plant_in_days_is_told_that_time_is_in_seconds() {
+    let folder = Folder::new();
+    let text = LAG.replace("unit=\"s\"", "unit=\"d\"");
+    folder.text("lag.mo", &text);
+    let run = folder.run(&["check", "lag.mo"]);
+    assert_eq!(run.stderr.matches("warning").count(), 1, "{}", run.stderr);
+    assert!(
+        run.stderr
+            .contains("`tau` is in d: the factor 86400 is missing"),
+        "{}",
+        run.stderr
+    );
+    folder.text("lag.mo", &text.replace("tau*der", "86400*tau*der"));
+    let run = folder.run(&["check", "lag.mo"]);
+    assert_eq!(run.stderr, "");
+}
+
+#[test]
+fn rows_without_outputs_are_simulated_from_an_estimated_state() {
+    let folder = Folder::new();
+    folder.text("lag.mo", LAG);
+    folder.text("past.csv", &step("t,u,y", 1.0, 40));
+    let run = folder.run(&[
+        "simulate",
+        "lag.mo",
+        "past.csv",
+        "--initial-state",
+        "estimate",
+    ]);
+    assert!(
+        run.stderr
+            .contains("from the 40 samples that have outputs; all 100 are simulated"),
+        "{}",
+        run.stderr
+    );
+    let (_, simulated) = columns(&run.ok());
+    assert_eq!(simulated[1].len(), 100);
+    assert!(
+        (simulated[1][99] - 1.0).abs() < 0.01,
+        "{}",
+        simulated[1][99]
+    );
+
+    // A linear model starts from the outputs of the first rows.
+    folder.text(
+        "bare.json",
+        r#"{"A": 0.9, "B": [[0.001]], "C": 1, "dt": 1}"#,
+    );
+    let past = [
+        "past.csv",
+        "--inputs",
+        "u",
+        "--outputs",
+        "y",
+        "--initial-state",
+        "estimate",
+    ];
+    let run = folder.run(&[&["simulate", "bare.json"], &past[..]].concat());
+    assert!(
+        run.stderr.contains("from the 40 samples up to"),
+        "{}",
+        run.stderr
+    );
+    assert_eq!(columns(&run.ok()).1[1].len(), 100);
+}
+
+#[test]
+fn an_explanation_remembers_the_names_of_the_columns() {
+    let folder = Folder::new();
+    folder.text("lag.mo", LAG);
+    folder.text("other.csv", &step("t,heater [W],speed [m/s]", 1.0, 100));
+    folder
+        .run(&[
+            "explain",
+            "other.csv",
+            "--simulation",
+            "lag.mo",
+            "--inputs",
+            "heater",
+            "--outputs",
+            "speed",
+            "-o",
+            "e.json",
+        ])
+        .ok();
+    let by_own_names = folder.run(&["simulate", "e.json", "other.csv"]).ok();
+    assert!(
+        by_own_names.starts_with("t [s],speed [m/s]"),
+        "{by_own_names}"
+    );
+    folder.text("plain.csv", &step("t,u,y", 1.0, 100));
+    assert_eq!(
+        folder.run(&["simulate", "e.json", "plain.csv"]).ok(),
+        by_own_names
+    );
+    folder.text("third.csv", &step("t,power,y", 1.0, 100));
+    let message = folder.run(&["simulate", "e.json", "third.csv"]).error();
+    assert!(message.contains("`--inputs` for u"), "{message}");
+}

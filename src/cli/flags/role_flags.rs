@@ -12,7 +12,7 @@ use crate::log::{Channel, Missing, Roles, TimeUnit};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Columns")]
 pub(crate) struct RoleFlags {
-    /// Input columns, comma-separated [default: headers that start with u]
+    /// Input columns, comma-separated; `none` if the simulated columns of `explain` have none [default: headers that start with u]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     inputs: Option<Vec<String>>,
     /// Output columns, comma-separated [default: headers that start with y]
@@ -58,6 +58,11 @@ pub(crate) fn tell_reading(name: &str, said: Option<&str>, say: Verbosity) {
 }
 
 impl RoleFlags {
+    /// Whether inputs or outputs are named.
+    pub(crate) fn names_columns(&self) -> bool {
+        self.inputs.is_some() || self.outputs.is_some()
+    }
+
     /// The roles as asked for.
     pub(crate) fn roles(self) -> Roles {
         Roles {

@@ -4,13 +4,16 @@ use std::path::Path;
 
 use anyhow::Context;
 
+use super::units_of_logs::{Channels, units_of_logs};
 use crate::cli::Verbosity;
 use crate::cli::flags::{RoleFlags, tell_reading};
 use crate::cli::terminal::note;
 use crate::explain::Explanation;
 use crate::identify::{IdentifiedChannel, Recording};
 use crate::log::{Channel, Log, LogError, Reading, RoleNeed, Roles, Source};
-use crate::physics::{Hold, Plant, Point, VariableId, diagnose, render_all, unknown_units};
+use crate::physics::{
+    Hold, Plant, Point, VariableId, diagnose, other_clock, render_all, unknown_units,
+};
 use crate::report::{PlantDocument, is_explanation, is_plant, parse_explanation};
 
 /// A plant from a file.
@@ -25,6 +28,8 @@ pub(crate) struct LoadedPlant {
     pub(crate) explanation: Option<Explanation>,
     /// What may be wrong with the text.
     pub(crate) warnings: Vec<String>,
+    /// That of them which makes answers wrong: equations in hours or days.
+    pub(crate) clock: Option<String>,
 }
 
 impl LoadedPlant {
@@ -85,6 +90,7 @@ pub(crate) fn load(path: &Path) -> anyhow::Result<LoadedPlant> {
             document: Some(document),
             explanation: None,
             warnings: vec![],
+            clock: None,
         });
     }
     of_text(&name, &text)
@@ -94,9 +100,11 @@ fn of_text(name: &str, text: &str) -> anyhow::Result<LoadedPlant> {
     let spec =
         diagnose(text).map_err(|errors| anyhow::anyhow!("{}", render_all(&errors, name, text)))?;
     let unknown = unknown_units(&spec).into_iter();
-    let warnings = unknown
+    let mut warnings: Vec<String> = unknown
         .map(|u| format!("{name}:{}:{}: {u}", u.line, u.column))
         .collect();
+    let clock = other_clock(&spec).map(|c| format!("{name}:{}:{}: {c}", c.line, c.column));
+    warnings.extend(clock.iter().cloned());
     let plant = Plant::new(spec);
     let point = plant.nominal();
     Ok(LoadedPlant {
@@ -106,6 +114,7 @@ fn of_text(name: &str, text: &str) -> anyhow::Result<LoadedPlant> {
         document: None,
         explanation: None,
         warnings,
+        clock,
     })
 }
 
@@ -116,13 +125,17 @@ pub(crate) fn tell_warnings(loaded: &LoadedPlant, say: Verbosity) {
     }
 }
 
-/// Channels of the plant's inputs and outputs.
-pub(crate) fn channels(plant: &Plant) -> (Vec<IdentifiedChannel>, Vec<IdentifiedChannel>) {
-    let channel = |v| IdentifiedChannel {
-        channel: Channel::new(plant.spec.variable(v).column()),
+pub(super) fn named(name: &str) -> IdentifiedChannel {
+    IdentifiedChannel {
+        channel: Channel::new(name),
         level: 0.0,
         delay: 0,
-    };
+    }
+}
+
+/// Channels of the plant's inputs and outputs.
+pub(crate) fn channels(plant: &Plant) -> Channels {
+    let channel = |v| named(plant.spec.variable(v).column());
     let spec = &plant.spec;
     (
         spec.inputs().into_iter().map(channel).collect(),
@@ -138,12 +151,14 @@ pub(crate) fn read_recordings(
     need: RoleNeed,
     say: Verbosity,
 ) -> anyhow::Result<(Vec<Log>, Vec<Recording>)> {
-    read_channels(&channels(plant), sources, flags, need, say)
+    let channels = channels(plant);
+    read_channels(plant, (&channels, &channels), sources, flags, need, say)
 }
 
-/// Reads these channels of a plant; one with gaps is several.
+/// Reads these channels of a plant, in its units, by the names of columns; a recording with gaps is several.
 pub(super) fn read_channels(
-    (inputs, outputs): &(Vec<IdentifiedChannel>, Vec<IdentifiedChannel>),
+    plant: &Plant,
+    (of_plant, (inputs, outputs)): (&Channels, &Channels),
     sources: &[Source],
     flags: &RoleFlags,
     need: RoleNeed,
@@ -155,10 +170,17 @@ pub(super) fn read_channels(
     } else {
         need
     };
-    read_with(&roles, sources, need, say).map_err(|e| match e.downcast::<LogError>() {
-        Ok(of_names) => other_names(of_names, inputs, outputs),
-        Err(other) => other,
-    })
+    let read =
+        read_with(&roles, sources, need, say).map_err(|e| match e.downcast::<LogError>() {
+            Ok(of_names) => other_names(of_names, inputs, outputs),
+            Err(other) => other,
+        })?;
+    for said in units_of_logs(&plant.spec, of_plant, &read.0)? {
+        if !say.quiet {
+            note(&format!("warning: {said}\n"));
+        }
+    }
+    Ok(read)
 }
 
 /// Reads recordings with these columns; one with gaps is several.
@@ -202,11 +224,17 @@ fn other_names(
     };
     let flags = [flag("--inputs", inputs), flag("--outputs", outputs)];
     let flags: Vec<String> = flags.into_iter().flatten().collect();
-    anyhow::anyhow!(
+    let said = format!(
         "{error}; where the file has other names than the plant, list its columns with {}, in this order",
         flags.join(" and with ")
-    )
+    );
+    OtherNames(said).into()
 }
+
+/// A recording that has other names than the plant.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(super) struct OtherNames(String);
 
 /// `name=value` pairs, separated by commas.
 pub(super) fn assignments(flag: &str, text: &str) -> anyhow::Result<Vec<(String, f64)>> {

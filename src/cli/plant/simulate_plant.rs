@@ -3,14 +3,15 @@
 use std::path::Path;
 
 use super::load_plant::{
-    LoadedPlant, all_known, assignments, channels, load, read_channels, read_with, set_parameters,
-    set_start, tell_warnings,
+    LoadedPlant, OtherNames, all_known, assignments, channels, load, named, read_channels,
+    read_with, set_parameters, set_start, tell_warnings,
 };
+use super::units_of_logs::Channels;
 use crate::cli::flags::RoleFlags;
 use crate::cli::terminal::note;
 use crate::cli::{Outcome, Verbosity};
 use crate::explain::AugmentedPlant;
-use crate::log::{Channel, RoleNeed, Roles, Source, write_table};
+use crate::log::{Channel, Log, RoleNeed, Roles, Source, write_table};
 use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
 use crate::physics::{Hold, Point};
 use crate::report::{PlantDocument, is_plant};
@@ -57,24 +58,38 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         parameters(&plant, &mut point, text)?;
         tell_out_of_bounds(&plant, &point, say);
     }
+    // Standard input is read once: there, rows without outputs cannot be told apart afterwards.
     let estimated = matches!(asked.start, Start::Estimate);
-    let need = if estimated {
-        RoleNeed::Identify
-    } else {
-        RoleNeed::InputsOnly
+    let again = estimated && asked.input.can_be_reopened();
+    let need = match estimated && !again {
+        true => RoleNeed::Identify,
+        false => RoleNeed::InputsOnly,
     };
     let found = explanation.as_ref().and_then(|e| e.plant.as_ref());
     let mut columns = channels(&plant);
     columns
         .0
         .retain(|i| found.is_none_or(|f| !f.simulated_inputs.contains(&i.channel.name)));
-    let (mut logs, _) = read_channels(
-        &columns,
-        std::slice::from_ref(asked.input),
-        asked.roles,
-        need,
-        say,
-    )?;
+    let remembered = found.and_then(|f| remembered(f, &columns));
+    let source = std::slice::from_ref(asked.input);
+    let read = |need: RoleNeed, say: Verbosity| {
+        let of = |names: &Channels| {
+            read_channels(&plant, (&columns, names), source, asked.roles, need, say)
+        };
+        let by_plant = of(&columns);
+        match (&remembered, by_plant) {
+            (Some(names), Err(error))
+                if error.is::<OtherNames>() && !asked.roles.names_columns() =>
+            {
+                of(names).map_err(|other| match other.is::<OtherNames>() {
+                    true => error,
+                    false => other,
+                })
+            }
+            (_, by_plant) => by_plant,
+        }
+    };
+    let (mut logs, _) = read(need, say)?;
     if logs.len() != 1 {
         anyhow::bail!(
             "{}: samples are missing in the middle; a simulation needs one without gaps (--missing interpolate)",
@@ -134,7 +149,14 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
                 least_squares: true,
             };
             let at_values = plant.with_values(&point.parameters);
-            let found = estimate(&at_values, &[PlantRecording::from(&log)], &options)?;
+            let mut recording = PlantRecording::from(&log);
+            if again && !columns.0.is_empty() {
+                let quiet = Verbosity { quiet: true, ..say };
+                let (parts, _) = read(RoleNeed::Identify, quiet)?;
+                recording.outputs = where_known(&log, &parts);
+                tell_missing(&log, &recording, say);
+            }
+            let found = estimate(&at_values, &[recording], &options)?;
             point.start = found.points[0].start.clone();
         }
     }
@@ -151,13 +173,57 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         unit: plant.spec.variable(v).unit_text.clone(),
     });
     let found = explanation.and_then(|e| e.plant);
-    let named: Vec<Channel> = found.map_or_else(|| declared.collect(), |p| p.outputs);
-    let columns: Vec<(&Channel, &[f64])> = named
+    let outputs_of: Vec<Channel> = found.map_or_else(|| declared.collect(), |p| p.outputs);
+    let columns: Vec<(&Channel, &[f64])> = outputs_of
         .iter()
         .zip(outputs.iter().map(Vec::as_slice))
         .collect();
     write_table(asked.output, log.sample_time, log.start_time, &columns)?;
     Ok(Outcome::Done)
+}
+
+/// The names of the columns that were explained, for those of the plant; none where they are the same.
+fn remembered(found: &AugmentedPlant, columns: &Channels) -> Option<Channels> {
+    let of = |all: &[Channel]| all.iter().map(|c| named(&c.name)).collect::<Vec<_>>();
+    let mut inputs = of(&found.inputs);
+    // The last ones are those of the simulator.
+    inputs.truncate(columns.0.len());
+    let names = (inputs, of(&found.outputs));
+    let fits = names.0.len() == columns.0.len() && names.1.len() == columns.1.len();
+    (fits && names != *columns).then_some(names)
+}
+
+/// Outputs of the parts of a recording on the samples of `log`; NaN where there are none.
+fn where_known(log: &Log, parts: &[Log]) -> Vec<Vec<f64>> {
+    let outputs = parts.first().map_or(0, |part| part.output_data.len());
+    let mut all = vec![vec![f64::NAN; log.samples()]; outputs];
+    for part in parts {
+        let first = ((part.start_time - log.start_time) / log.sample_time).round();
+        for (y, known) in all.iter_mut().zip(&part.output_data) {
+            for (k, value) in known.iter().enumerate() {
+                let at = first + k as f64;
+                if at >= 0.0
+                    && let Some(y) = y.get_mut(at as usize)
+                {
+                    *y = *value;
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Says how many samples the initial state is estimated from, where that is not all.
+fn tell_missing(log: &Log, recording: &PlantRecording, say: Verbosity) {
+    let known = |k: usize| recording.outputs.iter().all(|y| y[k].is_finite());
+    let count = (0..log.samples()).filter(|&k| known(k)).count();
+    if count < log.samples() && !say.quiet {
+        note(&format!(
+            "{}: the initial state is estimated from the {count} samples that have outputs; all {} are simulated\n",
+            log.name,
+            log.samples()
+        ));
+    }
 }
 
 /// The simulator's answer to one input.

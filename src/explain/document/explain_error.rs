@@ -99,9 +99,20 @@ pub enum ExplainError {
     Unstable { name: String, radius: f64 },
     /// The simulated output could not be understood.
     #[error(
-        "{name}: no dynamic model reproduces this simulated output from the recorded inputs (best relative misfit {misfit:.2}); check that it was simulated with these inputs, or give the model itself as JSON"
+        "{name}: no dynamic model reproduces this simulated output from the recorded inputs (best relative misfit {misfit:.2}); {}check that it was simulated with these inputs, or give the model itself as JSON",
+        never_change(.constant)
     )]
-    NotUnderstood { name: String, misfit: f64 },
+    NotUnderstood {
+        name: String,
+        misfit: f64,
+        /// Inputs that never change.
+        constant: Vec<String>,
+    },
+    /// No inputs, and no equations in place of the simulation.
+    #[error(
+        "{name}: the recording has no inputs, and no equations were found that reproduce this simulated output; give the simulator as a plant in equations (.mo), or name the inputs with --inputs"
+    )]
+    NoEquations { name: String },
     /// More states than the engine runs.
     #[error(
         "{name}: {states} states, and at most {most} can be explained; reduce the model's order first"
@@ -129,4 +140,21 @@ pub enum ExplainError {
         "{name}: no fit of the simulation to the recording succeeded; check that inputs and outputs are the ones that were simulated"
     )]
     NoFit { name: String },
+}
+
+/// What is to be said of inputs that never change, if there are any.
+fn never_change(inputs: &[String]) -> String {
+    let names: Vec<String> = inputs.iter().map(|name| format!("`{name}`")).collect();
+    match names.as_slice() {
+        [] => String::new(),
+        [one] => format!(
+            "the input {one} never changes, so that no response to it can be seen: leave it out with --inputs (`--inputs none` if it \
+             is the only one), or "
+        ),
+        several => format!(
+            "the inputs {} never change, so that no response to them can be seen: leave them out with --inputs (`--inputs none` if \
+             there is no other), or ",
+            several.join(", ")
+        ),
+    }
 }

@@ -1,6 +1,6 @@
 //! What is known of the simulation, and the recordings prepared to be compared with it.
 
-use super::check::{Checked, INTERPOLATION, between};
+use super::check::{Checked, INTERPOLATION, constant_inputs};
 use super::data::{Data, Segment, delayed};
 use super::identification::autoregression::{Simulator as Identified, identify_simulator};
 use super::identification::minimal_order::{Simplest, simplest};
@@ -16,6 +16,7 @@ use crate::explain::document::explain_error::ExplainError;
 use crate::explain::simulation::Simulation;
 use crate::identify::Model;
 use crate::log::{Channel, LARGEST_SIZE, Log};
+use crate::physics::{Comparison, compare, rounded};
 
 /// What a simulation turns out to be.
 #[derive(Debug, Clone)]
@@ -29,11 +30,32 @@ pub(crate) enum Simulator {
 pub(crate) fn know(checked: &Checked) -> Result<Simulator, ExplainError> {
     let (recordings, simulation) = (checked.recordings.as_slice(), &checked.simulation);
     let first = recordings.first().ok_or(ExplainError::NoRecording)?;
+    if first.inputs.is_empty() {
+        return Err(ExplainError::NoChannels {
+            recording: first.name.clone(),
+        });
+    }
+    check(recordings, simulation)?;
+    let simulator = match simulation {
+        Simulation::Model(model, name) => {
+            Simulator::Linear(Box::new(of_model(recordings, model, name)?))
+        }
+        Simulation::Outputs(logs) => of_outputs(recordings, logs, checked.interpolated)?,
+    };
+    if let Simulator::Linear(known) = &simulator {
+        known.check(checked)?;
+    }
+    Ok(simulator)
+}
+
+/// Refuses recordings that cannot be explained, and columns that do not belong to them.
+pub(crate) fn check(recordings: &[Log], simulation: &Simulation) -> Result<(), ExplainError> {
+    let first = recordings.first().ok_or(ExplainError::NoRecording)?;
     for log in recordings {
         log.check()?;
         first.check_same_kind(log)?;
     }
-    if first.inputs.is_empty() || first.outputs.is_empty() {
+    if first.outputs.is_empty() {
         return Err(ExplainError::NoChannels {
             recording: first.name.clone(),
         });
@@ -49,21 +71,12 @@ pub(crate) fn know(checked: &Checked) -> Result<Simulator, ExplainError> {
         }
     }
     recordings.iter().try_for_each(check_sizes)?;
-    let simulator = match simulation {
-        Simulation::Model(model, name) => {
-            Simulator::Linear(Box::new(of_model(recordings, model, name)?))
-        }
-        Simulation::Outputs(logs) => {
-            logs.iter().try_for_each(Log::check)?;
-            logs.iter().try_for_each(check_sizes)?;
-            check_outputs(recordings, logs)?;
-            of_outputs(recordings, logs, checked.interpolated)?
-        }
-    };
-    if let Simulator::Linear(known) = &simulator {
-        known.check(checked)?;
+    if let Simulation::Outputs(logs) = simulation {
+        logs.iter().try_for_each(Log::check)?;
+        logs.iter().try_for_each(check_sizes)?;
+        check_outputs(recordings, logs)?;
     }
-    Ok(simulator)
+    Ok(())
 }
 
 /// Refuses channels so large or so small that their squares and products leave the range of numbers. A channel that does
@@ -234,21 +247,22 @@ fn relative_difference(a: f64, b: f64) -> f64 {
 }
 
 fn check_unit(name: &str, ours: &Channel, theirs: &Channel) -> Result<(), ExplainError> {
-    match (&ours.unit, &theirs.unit) {
-        (Some(recorded), Some(simulated)) if recorded != simulated => Err(ExplainError::Unit {
-            simulation: name.to_owned(),
-            channel: ours.name.clone(),
-            recorded: recorded.clone(),
-            simulated: simulated.clone(),
-            factor: between(recorded, simulated).map_or_else(String::new, |f| {
-                format!(
-                    " (1 {simulated} is {} {recorded})",
-                    crate::explain::document::sentences::number(f)
-                )
-            }),
-        }),
-        _ => Ok(()),
-    }
+    let (Some(recorded), Some(simulated)) = (&ours.unit, &theirs.unit) else {
+        return Ok(());
+    };
+    let factor = match compare(simulated, recorded) {
+        Comparison::Alike => return Ok(()),
+        Comparison::Factor(factor) => format!(" (1 {simulated} is {} {recorded})", rounded(factor)),
+        Comparison::Offset(offset) => format!(" (add {} to the simulation)", rounded(offset)),
+        Comparison::Dimension => String::new(),
+    };
+    Err(ExplainError::Unit {
+        simulation: name.to_owned(),
+        channel: ours.name.clone(),
+        recorded: recorded.clone(),
+        simulated: simulated.clone(),
+        factor,
+    })
 }
 
 fn check_outputs(recordings: &[Log], logs: &[Log]) -> Result<(), ExplainError> {
@@ -328,6 +342,7 @@ fn of_outputs(
     let simulator = identify_simulator(&noise_free).ok_or_else(|| ExplainError::NotUnderstood {
         name: name(),
         misfit: 1.0,
+        constant: constant_inputs(recordings),
     })?;
     let structure = bare(&simulator.plant, &simulator.initial);
     if simulator.is_linear() || interpolated && simulator.misfit < INTERPOLATION {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::check::Checked;
+use super::check::{Checked, constant_inputs};
 use super::data::{Data, Series};
 use super::fit::{Effort, Fit, Problem};
 use super::known::Known;
@@ -40,6 +40,7 @@ impl NonlinearSimulator {
         let known = self.learnt().ok_or_else(|| ExplainError::NotUnderstood {
             name: self.name.clone(),
             misfit: self.misfit,
+            constant: constant_inputs(&checked.recordings),
         })?;
         known.check(checked)?;
         Ok(known)

@@ -82,6 +82,7 @@ pub fn explain_plant(
         found: &found,
         hypotheses: &scope.hypotheses,
         units: units_in_words(&found.plant.spec),
+        inputs: logs.first().map_or_else(Vec::new, |log| log.inputs.clone()),
         channels: logs
             .first()
             .map_or_else(Vec::new, |log| log.outputs.clone()),
@@ -97,6 +98,7 @@ struct Answer<'a> {
     hold: Hold,
     found: &'a Found,
     hypotheses: &'a [Hypothesis],
+    inputs: Vec<Channel>,
     channels: Vec<Channel>,
     /// Of every variable of the plant with its effects.
     units: Vec<Option<String>>,
@@ -332,6 +334,7 @@ impl Answer<'_> {
             model: None,
             plant: Some(AugmentedPlant {
                 modelica: self.text(relied_on),
+                inputs: self.inputs.clone(),
                 outputs: self.channels.clone(),
                 simulation: None,
                 simulated_inputs: vec![],

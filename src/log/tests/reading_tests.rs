@@ -106,6 +106,19 @@ fn needs_decide_what_is_read() {
     assert_eq!(reader.finish().unwrap().samples, 2);
     let reader = open(csv, &roles("", "y1"), RoleNeed::OutputsOnly).unwrap();
     assert_eq!((reader.inputs().len(), reader.outputs().len()), (0, 1));
+    let free = RoleNeed::OutputsAndMaybeInputs;
+    let inputs = |csv, roles: &Roles| open(csv, roles, free).map(|r| r.inputs().len());
+    assert_eq!(inputs("t,y\n0,1\n1,2\n", &Roles::default()).unwrap(), 0);
+    assert_eq!(
+        inputs("t,u,y\n0,1,1\n1,1,2\n", &Roles::default()).unwrap(),
+        1
+    );
+    let left = "t,a,y\n0,1,1\n1,1,2\n";
+    let error = inputs(left, &Roles::default()).unwrap_err().to_string();
+    assert!(error.contains("`--inputs none`"), "{error}");
+    assert_eq!(inputs(left, &roles("none", "y")).unwrap(), 0);
+    let called_so = "t,none,y\n0,1,1\n1,1,2\n";
+    assert_eq!(inputs(called_so, &roles("none", "y")).unwrap(), 1);
     let maybe = RoleNeed::InputsAndMaybeOutputs;
     assert_eq!(
         open(csv, &roles("u", "y1,y2"), maybe)

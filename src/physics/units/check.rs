@@ -2,12 +2,15 @@
 //!
 //! What is not known for certain matches everything: variables without a unit, and numbers that may carry one.
 
-use super::Unit;
 use super::words::Words;
+use super::{Unit, symbols};
 use crate::physics::error::{SpecError, SpecErrorKind, excerpt};
-use crate::physics::expression::{Binary, ExpressionId, Function, Node, Span};
-use crate::physics::spec::ModelSpec;
+use crate::physics::expression::{Binary, ExpressionId, Function, Node, Span, VariableId};
+use crate::physics::spec::{ModelSpec, VariableKind};
 use crate::physics::syntax::constant;
+
+/// Sizes of units that differ by less than this part are equal: conversions are rounded.
+const SAME_SIZE: f64 = 1e-3;
 
 /// What is known about the unit of an expression.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,6 +27,8 @@ pub(super) enum Known {
     /// A unit.
     Is {
         unit: Unit,
+        /// Its size in base units of the SI; NaN where that is not known.
+        size: f64,
         /// A literal is a factor: in the argument of a function it may carry the inverse unit.
         scaled: bool,
         /// A fraction times one other factor, as in `tau = 0.5*u`: this is the way to write a gain.
@@ -32,9 +37,10 @@ pub(super) enum Known {
 }
 
 impl Known {
-    fn is(unit: Unit) -> Self {
+    fn is(unit: Unit, size: f64) -> Self {
         Self::Is {
             unit,
+            size,
             scaled: false,
             gain: false,
         }
@@ -47,6 +53,16 @@ impl Known {
                 unit, gain: false, ..
             } => Some(unit),
             _ => None,
+        }
+    }
+
+    /// The size of a unit that is certain; NaN where it is not known.
+    fn size(self) -> f64 {
+        match self {
+            Self::Is {
+                size, gain: false, ..
+            } => size,
+            _ => f64::NAN,
         }
     }
 }
@@ -71,6 +87,23 @@ pub(crate) fn unit_conflicts(spec: &ModelSpec) -> Vec<SpecError> {
         SpecError::new(&spec.text, at, kind)
     };
     conflicts.into_iter().map(error).collect()
+}
+
+/// Parts of one dimension and different size, which have to be alike.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SizeConflict {
+    /// What holds both.
+    pub(super) at: Span,
+    pub(super) parts: [ExpressionId; 2],
+    pub(super) sizes: [f64; 2],
+}
+
+/// All parts of different size, in the order of the text.
+pub(super) fn size_conflicts(spec: &ModelSpec) -> Vec<SizeConflict> {
+    let mut checker = Checker::examined(spec);
+    checker.equations();
+    checker.sizes.sort_by_key(|c| c.at.start);
+    checker.sizes
 }
 
 /// The nodes that stand in the text, as opposed to those made by solving.
@@ -102,6 +135,8 @@ pub(super) struct Checker<'a> {
     pub(super) known: Vec<Known>,
     /// Where they stand, and what is said about them.
     conflicts: Vec<(Span, String)>,
+    /// Parts of different size.
+    sizes: Vec<SizeConflict>,
 }
 
 impl<'a> Checker<'a> {
@@ -113,6 +148,7 @@ impl<'a> Checker<'a> {
             used: used(spec),
             known: vec![Known::Nothing; spec.expressions.len()],
             conflicts: vec![],
+            sizes: vec![],
         };
         for index in 0..spec.expressions.len() {
             if checker.used[index] {
@@ -159,18 +195,16 @@ impl Checker<'_> {
             Node::Number(value) => self.number(id, value),
             Node::Time => Known::Is {
                 unit: Unit::SECOND,
+                size: 1.0,
                 // `sin(time)` is meant as `sin(1*time)`.
                 scaled: true,
                 gain: false,
             },
-            Node::Variable(v) | Node::Previous(v) => {
-                self.spec.variable(v).unit.map_or(Known::Nothing, Known::is)
-            }
-            Node::Derivative(v) => self
-                .spec
-                .variable(v)
-                .unit
-                .map_or(Known::Nothing, |u| Known::is(u.per(&Unit::SECOND))),
+            Node::Variable(v) | Node::Previous(v) => self.declared(v),
+            Node::Derivative(v) => match self.declared(v) {
+                Known::Is { unit, size, .. } => Known::is(unit.per(&Unit::SECOND), size),
+                other => other,
+            },
             Node::Negate(a) => match of(a) {
                 Known::Literal { value, pure } => Known::Literal {
                     value: -value,
@@ -186,6 +220,21 @@ impl Checker<'_> {
         }
     }
 
+    fn declared(&self, v: VariableId) -> Known {
+        let variable = self.spec.variable(v);
+        let Some(unit) = variable.unit else {
+            return Known::Nothing;
+        };
+        let text = variable.unit_text.as_deref().unwrap_or("");
+        // A constant number may be a conversion, such as 3600.
+        let number = matches!(
+            variable.kind,
+            VariableKind::Constant | VariableKind::Parameter
+        ) && unit.is_one();
+        let size = symbols::parse(text.trim()).map_or(f64::NAN, |found| found.size);
+        Known::is(unit, if number { f64::NAN } else { size })
+    }
+
     fn number(&self, id: ExpressionId, value: f64) -> Known {
         let span = self.spec.expressions.span(id);
         let written = self.spec.text.get(span.start..span.end).unwrap_or("");
@@ -196,7 +245,8 @@ impl Checker<'_> {
         let short = written.rsplit('.').next().unwrap_or("");
         match constant(&format!("Modelica.Constants.{short}")) {
             Some((_, Some("1"))) => Known::Literal { value, pure: true },
-            Some((_, Some(unit))) => Unit::parse(unit).map_or(Known::Nothing, Known::is),
+            Some((_, Some(unit))) => symbols::parse(unit)
+                .map_or(Known::Nothing, |found| Known::is(found.unit, found.size)),
             _ => Known::Literal { value, pure: false },
         }
     }
@@ -205,7 +255,7 @@ impl Checker<'_> {
         let argument = self.known[a.index()];
         match function {
             Function::Abs => argument,
-            Function::Sign => Known::is(Unit::ONE),
+            Function::Sign => Known::is(Unit::ONE, 1.0),
             Function::Sqrt => power(argument, 0.5),
             _ => {
                 if let Known::Is {
@@ -228,7 +278,7 @@ impl Checker<'_> {
                         value: f64::NAN,
                         pure,
                     },
-                    _ => Known::is(Unit::ONE),
+                    _ => Known::is(Unit::ONE, 1.0),
                 }
             }
         }
@@ -248,16 +298,24 @@ impl Checker<'_> {
             Binary::Multiply => product(left, right),
             Binary::Divide => match (left, product(left, power(right, -1.0))) {
                 // A quotient such as `m*v^2/2` is no gain.
-                (Known::Is { gain, .. }, Known::Is { unit, scaled, .. }) => {
-                    Known::Is { unit, scaled, gain }
-                }
+                (
+                    Known::Is { gain, .. },
+                    Known::Is {
+                        unit, size, scaled, ..
+                    },
+                ) => Known::Is {
+                    unit,
+                    size,
+                    scaled,
+                    gain,
+                },
                 (_, quotient) => quotient,
             },
             Binary::Power => self.raise(id, b, left, right),
             Binary::Min | Binary::Max => self.alike(id, a, b, "and", ""),
             Binary::Atan2 => {
                 self.alike(id, a, b, "and", "");
-                Known::is(Unit::ONE)
+                Known::is(Unit::ONE, 1.0)
             }
             Binary::And | Binary::Or => Known::Nothing,
             _ => {
@@ -290,16 +348,24 @@ impl Checker<'_> {
             self.conflict(id, message);
             return Known::Nothing;
         }
+        self.compare_sizes(self.spec.expressions.span(id), [a, b]);
         match (left, right) {
             (
-                Known::Is { unit, scaled, gain },
+                Known::Is {
+                    unit,
+                    size,
+                    scaled,
+                    gain,
+                },
                 Known::Is {
                     unit: other,
+                    size: another,
                     scaled: also,
                     gain: weak,
                 },
             ) => Known::Is {
                 unit: if gain { other } else { unit },
+                size: if gain || size.is_nan() { another } else { size },
                 scaled: scaled || also,
                 gain: gain && weak,
             },
@@ -310,6 +376,19 @@ impl Checker<'_> {
                 pure: x && y,
             },
             _ => Known::Nothing,
+        }
+    }
+
+    /// Keeps parts of one dimension whose sizes differ.
+    fn compare_sizes(&mut self, at: Span, parts: [ExpressionId; 2]) {
+        let known = parts.map(|p| self.known[p.index()]);
+        let [Some(one), Some(other)] = known.map(Known::certain) else {
+            return;
+        };
+        let sizes = known.map(Known::size);
+        let factor = sizes[0] / sizes[1];
+        if one.same(&other) && factor.is_finite() && (factor - 1.0).abs() > SAME_SIZE {
+            self.sizes.push(SizeConflict { at, parts, sizes });
         }
     }
 
@@ -329,7 +408,7 @@ impl Checker<'_> {
         match (base, by) {
             (_, Known::Literal { value, .. }) if value.is_finite() => power(base, value),
             (Known::Is { unit, .. }, _) if unit.is_one() => base,
-            (Known::Literal { pure: true, .. }, _) => Known::is(Unit::ONE),
+            (Known::Literal { pure: true, .. }, _) => Known::is(Unit::ONE, 1.0),
             _ => Known::Nothing,
         }
     }
@@ -357,6 +436,7 @@ impl Checker<'_> {
                 );
                 self.conflict(left, message);
             }
+            self.compare_sizes(equation.span, [left, right]);
         }
     }
 
@@ -403,8 +483,8 @@ fn product(a: Known, b: Known) -> Known {
                 pure: (p && q) || matches!(literal(x * y), Known::Literal { pure: true, .. }),
             }
         }
-        (Known::Literal { value, pure }, Known::Is { unit, .. })
-        | (Known::Is { unit, .. }, Known::Literal { value, pure }) => {
+        (Known::Literal { value, pure }, Known::Is { unit, size, .. })
+        | (Known::Is { unit, size, .. }, Known::Literal { value, pure }) => {
             if unit.is_one() {
                 // `0.1*exp(x)` may stand for 0.1 V.
                 let value = f64::NAN;
@@ -416,19 +496,24 @@ fn product(a: Known, b: Known) -> Known {
             let fraction = value.is_finite() && value.fract() != 0.0;
             Known::Is {
                 unit,
+                size,
                 scaled: true,
                 gain: fraction,
             }
         }
         (
-            Known::Is { unit, scaled, .. },
+            Known::Is {
+                unit, size, scaled, ..
+            },
             Known::Is {
                 unit: other,
+                size: another,
                 scaled: also,
                 ..
             },
         ) => Known::Is {
             unit: unit.times(&other),
+            size: size * another,
             scaled: scaled || also,
             gain: false,
         },
@@ -441,9 +526,19 @@ fn power(base: Known, exponent: f64) -> Known {
             value: value.powf(exponent),
             pure,
         },
-        Known::Is { unit, scaled, gain } => unit
+        Known::Is {
+            unit,
+            size,
+            scaled,
+            gain,
+        } => unit
             .power(exponent)
-            .map_or(Known::Nothing, |unit| Known::Is { unit, scaled, gain }),
+            .map_or(Known::Nothing, |unit| Known::Is {
+                unit,
+                size: size.powf(exponent),
+                scaled,
+                gain,
+            }),
         Known::Nothing => Known::Nothing,
     }
 }

@@ -32,95 +32,123 @@ const FLUX: Unit = base([2.0, 1.0, -2.0, -1.0, 0.0, 0.0, 0.0]);
 const FIELD: Unit = base([0.0, 1.0, -2.0, -1.0, 0.0, 0.0, 0.0]);
 const DOSE: Unit = base([2.0, 0.0, -2.0, 0.0, 0.0, 0.0, 0.0]);
 
-/// Symbols that take the prefixes of the SI.
-const PREFIXED: [(&str, Unit); 36] = [
-    ("m", LENGTH),
-    ("g", MASS),
-    ("s", TIME),
-    ("A", CURRENT),
-    ("K", TEMPERATURE),
-    ("mol", AMOUNT),
-    ("cd", LIGHT),
-    ("rad", NUMBER),
-    ("sr", NUMBER),
-    ("Hz", FREQUENCY),
-    ("N", FORCE),
-    ("Pa", PRESSURE),
-    ("W", POWER),
-    ("J", ENERGY),
-    ("C", CHARGE),
-    ("V", VOLTAGE),
-    ("F", CAPACITANCE),
-    ("Ohm", RESISTANCE),
-    ("ohm", RESISTANCE),
-    ("S", CONDUCTANCE),
-    ("Wb", FLUX),
-    ("T", FIELD),
-    ("H", INDUCTANCE),
-    ("lm", LIGHT),
-    ("Bq", FREQUENCY),
-    ("Gy", DOSE),
-    ("Sv", DOSE),
-    ("l", VOLUME),
-    ("L", VOLUME),
-    ("t", MASS),
-    ("bar", PRESSURE),
-    ("eV", ENERGY),
-    ("VA", POWER),
-    ("var", POWER),
-    ("Wh", ENERGY),
-    ("Ah", CHARGE),
+/// Radians in a turn.
+const TURN: f64 = std::f64::consts::TAU;
+
+/// Symbols that take the prefixes of the SI, and their size in base units; NaN where a symbol has several sizes.
+const PREFIXED: [(&str, Unit, f64); 36] = [
+    ("m", LENGTH, 1.0),
+    ("g", MASS, 1e-3),
+    ("s", TIME, 1.0),
+    ("A", CURRENT, 1.0),
+    ("K", TEMPERATURE, 1.0),
+    ("mol", AMOUNT, 1.0),
+    ("cd", LIGHT, 1.0),
+    ("rad", NUMBER, 1.0),
+    ("sr", NUMBER, 1.0),
+    ("Hz", FREQUENCY, 1.0),
+    ("N", FORCE, 1.0),
+    ("Pa", PRESSURE, 1.0),
+    ("W", POWER, 1.0),
+    ("J", ENERGY, 1.0),
+    ("C", CHARGE, 1.0),
+    ("V", VOLTAGE, 1.0),
+    ("F", CAPACITANCE, 1.0),
+    ("Ohm", RESISTANCE, 1.0),
+    ("ohm", RESISTANCE, 1.0),
+    ("S", CONDUCTANCE, 1.0),
+    ("Wb", FLUX, 1.0),
+    ("T", FIELD, 1.0),
+    ("H", INDUCTANCE, 1.0),
+    ("lm", LIGHT, 1.0),
+    ("Bq", FREQUENCY, 1.0),
+    ("Gy", DOSE, 1.0),
+    ("Sv", DOSE, 1.0),
+    ("l", VOLUME, 1e-3),
+    ("L", VOLUME, 1e-3),
+    ("t", MASS, 1e3),
+    ("bar", PRESSURE, 1e5),
+    ("eV", ENERGY, 1.602_176_634e-19),
+    ("VA", POWER, 1.0),
+    ("var", POWER, 1.0),
+    ("Wh", ENERGY, 3600.0),
+    ("Ah", CHARGE, 3600.0),
 ];
 
 /// Symbols that stand alone.
-const ALONE: [(&str, Unit); 41] = [
-    ("1", NUMBER),
-    ("%", NUMBER),
-    ("ppm", NUMBER),
-    ("deg", NUMBER),
-    ("°", NUMBER),
-    ("rev", NUMBER),
-    ("r", NUMBER),
-    ("arcmin", NUMBER),
-    ("arcsec", NUMBER),
-    ("gon", NUMBER),
-    ("-", NUMBER),
-    ("min", TIME),
-    ("h", TIME),
-    ("hr", TIME),
-    ("d", TIME),
-    ("day", TIME),
-    ("week", TIME),
-    ("yr", TIME),
-    ("rpm", FREQUENCY),
-    ("kat", base([0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0])),
-    ("lx", base([-2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])),
-    ("degC", TEMPERATURE),
-    ("°C", TEMPERATURE),
-    ("degF", TEMPERATURE),
-    ("degRk", TEMPERATURE),
-    ("degK", TEMPERATURE),
-    ("ha", AREA),
-    ("Ω", RESISTANCE),
-    ("cc", VOLUME),
-    ("gal", VOLUME),
-    ("in", LENGTH),
-    ("ft", LENGTH),
-    ("mi", LENGTH),
-    ("mph", SPEED),
-    ("kn", SPEED),
-    ("lb", MASS),
-    ("lbf", FORCE),
-    ("kgf", FORCE),
-    ("psi", PRESSURE),
-    ("atm", PRESSURE),
-    ("cal", ENERGY),
+const ALONE: [(&str, Unit, f64); 41] = [
+    ("1", NUMBER, 1.0),
+    ("%", NUMBER, 0.01),
+    ("ppm", NUMBER, 1e-6),
+    ("deg", NUMBER, TURN / 360.0),
+    ("°", NUMBER, TURN / 360.0),
+    ("rev", NUMBER, TURN),
+    ("r", NUMBER, TURN),
+    ("arcmin", NUMBER, TURN / 21_600.0),
+    ("arcsec", NUMBER, TURN / 1_296_000.0),
+    ("gon", NUMBER, TURN / 400.0),
+    ("-", NUMBER, 1.0),
+    ("min", TIME, 60.0),
+    ("h", TIME, 3600.0),
+    ("hr", TIME, 3600.0),
+    ("d", TIME, 86_400.0),
+    ("day", TIME, 86_400.0),
+    ("week", TIME, 604_800.0),
+    ("yr", TIME, f64::NAN),
+    ("rpm", FREQUENCY, TURN / 60.0),
+    ("kat", base([0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0]), 1.0),
+    ("lx", base([-2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), 1.0),
+    ("degC", TEMPERATURE, 1.0),
+    ("°C", TEMPERATURE, 1.0),
+    ("degF", TEMPERATURE, 5.0 / 9.0),
+    ("degRk", TEMPERATURE, 5.0 / 9.0),
+    ("degK", TEMPERATURE, 1.0),
+    ("ha", AREA, 1e4),
+    ("Ω", RESISTANCE, 1.0),
+    ("cc", VOLUME, 1e-6),
+    ("gal", VOLUME, f64::NAN),
+    ("in", LENGTH, 0.0254),
+    ("ft", LENGTH, 0.3048),
+    ("mi", LENGTH, 1609.344),
+    ("mph", SPEED, 0.44704),
+    ("kn", SPEED, 1852.0 / 3600.0),
+    ("lb", MASS, 0.453_592_37),
+    ("lbf", FORCE, 4.448_221_615_260_5),
+    ("kgf", FORCE, 9.806_65),
+    ("psi", PRESSURE, 6_894.757_293_168),
+    ("atm", PRESSURE, 101_325.0),
+    ("cal", ENERGY, f64::NAN),
 ];
 
-/// Prefixes of the SI; factors are left out.
-const PREFIXES: [&str; 22] = [
-    "da", "Y", "Z", "E", "P", "T", "G", "M", "k", "h", "d", "c", "m", "u", "µ", "μ", "n", "p", "f",
-    "a", "z", "y",
+/// Symbols of an angle: a turn is 1 for some and 2*pi for others.
+const ANGLES: [&str; 9] = [
+    "rad", "deg", "°", "rev", "r", "arcmin", "arcsec", "gon", "rpm",
+];
+
+/// Prefixes of the SI.
+const PREFIXES: [(&str, f64); 22] = [
+    ("da", 1e1),
+    ("Y", 1e24),
+    ("Z", 1e21),
+    ("E", 1e18),
+    ("P", 1e15),
+    ("T", 1e12),
+    ("G", 1e9),
+    ("M", 1e6),
+    ("k", 1e3),
+    ("h", 1e2),
+    ("d", 1e-1),
+    ("c", 1e-2),
+    ("m", 1e-3),
+    ("u", 1e-6),
+    ("µ", 1e-6),
+    ("μ", 1e-6),
+    ("n", 1e-9),
+    ("p", 1e-12),
+    ("f", 1e-15),
+    ("a", 1e-18),
+    ("z", 1e-21),
+    ("y", 1e-24),
 ];
 
 /// Parentheses inside each other.
@@ -151,8 +179,50 @@ pub(super) fn usual() -> impl Iterator<Item = &'static str> {
     single.chain(WITH_PREFIX)
 }
 
+/// A unit with its size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sized {
+    pub(super) unit: Unit,
+    /// In base units of the SI; NaN where it is not known.
+    pub(super) size: f64,
+    /// Exponent of angles.
+    pub(super) angle: f64,
+}
+
+impl Sized {
+    const ONE: Self = Self {
+        unit: NUMBER,
+        size: 1.0,
+        angle: 0.0,
+    };
+
+    pub(super) fn times(&self, other: &Self) -> Self {
+        Self {
+            unit: self.unit.times(&other.unit),
+            size: self.size * other.size,
+            angle: self.angle + other.angle,
+        }
+    }
+
+    fn power(&self, exponent: f64) -> Option<Self> {
+        Some(Self {
+            unit: self.unit.power(exponent)?,
+            size: self.size.powf(exponent),
+            angle: self.angle * exponent,
+        })
+    }
+
+    fn per(&self, other: &Self) -> Self {
+        Self {
+            unit: self.unit.per(&other.unit),
+            size: self.size / other.size,
+            angle: self.angle - other.angle,
+        }
+    }
+}
+
 /// Reads `kg.m2/(s3.A)`.
-pub(super) fn parse(text: &str) -> Option<Unit> {
+pub(super) fn parse(text: &str) -> Option<Sized> {
     if text.is_empty() || text.len() > 200 {
         return None;
     }
@@ -187,7 +257,7 @@ impl<'a> Reader<'a> {
         &rest[..length]
     }
 
-    fn product(&mut self, depth: usize) -> Option<Unit> {
+    fn product(&mut self, depth: usize) -> Option<Sized> {
         let mut answer = self.power(depth)?;
         let mut divided = false;
         loop {
@@ -206,7 +276,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn power(&mut self, depth: usize) -> Option<Unit> {
+    fn power(&mut self, depth: usize) -> Option<Sized> {
         if depth >= DEEPEST {
             return None;
         }
@@ -218,12 +288,12 @@ impl<'a> Reader<'a> {
             inner
         } else if self.rest().starts_with(|c: char| c.is_ascii_digit()) {
             // A number is a factor; only `1` is usual.
-            self.span(|c| c.is_ascii_digit());
-            return Some(NUMBER);
+            let size = self.span(|c| c.is_ascii_digit()).parse().ok()?;
+            return Some(Sized { size, ..Sized::ONE });
         } else {
             let symbol = self.span(|c| c.is_alphabetic() || matches!(c, '%' | '°' | '_'));
             if symbol.is_empty() && self.take('-') {
-                NUMBER
+                Sized::ONE
             } else {
                 find(symbol)?
             }
@@ -273,15 +343,24 @@ impl<'a> Reader<'a> {
 }
 
 /// The unit of one symbol.
-fn find(symbol: &str) -> Option<Unit> {
-    let among =
-        |table: &[(&str, Unit)], wanted: &str| table.iter().find(|e| e.0 == wanted).map(|e| e.1);
+pub(super) fn find(symbol: &str) -> Option<Sized> {
+    let among = |table: &[(&str, Unit, f64)], wanted: &str| {
+        let entry = table.iter().find(|e| e.0 == wanted)?;
+        Some(Sized {
+            unit: entry.1,
+            size: entry.2,
+            angle: f64::from(u8::from(ANGLES.contains(&wanted))),
+        })
+    };
     among(&ALONE, symbol)
         .or_else(|| among(&PREFIXED, symbol))
         .or_else(|| {
-            PREFIXES
-                .iter()
-                .filter_map(|p| symbol.strip_prefix(p))
-                .find_map(|rest| among(&PREFIXED, rest))
+            PREFIXES.iter().find_map(|(prefix, factor)| {
+                let found = among(&PREFIXED, symbol.strip_prefix(prefix)?)?;
+                Some(Sized {
+                    size: found.size * factor,
+                    ..found
+                })
+            })
         })
 }

@@ -28,7 +28,6 @@ pub(crate) use coarse_sensor::coarse_sensor;
 pub(crate) use finding::Trouble;
 pub(crate) use frozen_sensor::{Freeze, frozen};
 pub(crate) use rates::same_factor;
-pub(crate) use relation::between;
 
 use self::relation::Pairs;
 use super::data::{Data, Segment};
@@ -301,6 +300,20 @@ impl Checked {
             }
         }
     }
+}
+
+/// Names of inputs that never change.
+pub(crate) fn constant_inputs(recordings: &[Log]) -> Vec<String> {
+    let inputs = recordings.first().map_or(&[][..], |log| &log.inputs);
+    let moves = |j: usize| {
+        let of = |log: &Log| {
+            let u = log.input_data.get(j).map_or(&[][..], Vec::as_slice);
+            u.iter().any(|v| *v != u[0])
+        };
+        recordings.iter().any(of)
+    };
+    let constant = inputs.iter().enumerate().filter(|(j, _)| !moves(*j));
+    constant.map(|(_, channel)| channel.name.clone()).collect()
 }
 
 /// Whether columns can be compared one by one.
