@@ -1,6 +1,8 @@
 //! The answer where the simulation is a plant in equations.
 
+mod formula_in_numbers;
 mod hypotheses;
+mod joint_test;
 mod location;
 mod plant_effects;
 mod plant_summary;
@@ -15,7 +17,8 @@ pub use simulate_explained::{AugmentedPlantError, Original};
 
 use nalgebra::DMatrix;
 
-use self::plant_summary::as_good;
+use self::joint_test::joint_test;
+use self::plant_summary::{Differs, Told, as_good};
 use self::stated_probability::probability;
 use self::where_to_look::experiment;
 use self::within_bounds::within_bounds;
@@ -31,7 +34,7 @@ use super::engine::terms::term::Port;
 use super::engine::thresholds::{LEFT, SURE, chance};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
-    FitTable, NoiseFound, ParameterChange, Remaining, SignalTraces, Verdict,
+    FitTable, JointTest, NoiseFound, OutputFit, ParameterChange, Remaining, SignalTraces, Verdict,
 };
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
@@ -248,37 +251,51 @@ impl Answer<'_> {
         let heldout_gain = held_out
             .as_ref()
             .map_or(0.0, |h| h.parameters_only.rmse - h.augmented.rmse);
-        let mut summary = self.summary(
+        let mut each: Vec<OutputFit> = (0..l)
+            .map(|o| {
+                let train = steps(o);
+                OutputFit {
+                    output: outputs[o].clone(),
+                    heldout: self.held_out(o, &train),
+                    train,
+                }
+            })
+            .collect();
+        let percent = |o: &OutputFit| o.train.augmented.fit_percent;
+        each.sort_by(|a, b| percent(a).total_cmp(&percent(b)));
+        let alternatives = self.alternatives();
+        let probability = probability(verdict, effects.len(), p_value);
+        let (differs, together) = match verdict {
+            Verdict::Consistent => self.differs(),
+            _ => (Differs::Parameters, None),
+        };
+        let mut summary = self.summary(&Told {
             verdict,
-            &effects,
-            &parameters,
-            &outputs[shows],
-            (&train, held_out.as_ref()),
+            probability,
+            effects: &effects,
+            parameters: &parameters,
+            differs,
+            alternatives: &alternatives,
+            outputs: &each,
             p_value,
-        );
+            strays: self.strays(&each),
+        });
         if !runs {
             summary.push(
                 "The equations cannot be simulated over the recording with the values of the text; the mean of the recording stands for them."
                     .to_owned(),
             );
         }
-        let alternatives = self.alternatives(verdict);
         let closest = effects.first().filter(|_| verdict == Verdict::Unexplained);
         summary.extend(closest.and_then(|e| as_good(e, &alternatives)));
-        let separating_experiment = (verdict == Verdict::Unexplained).then(|| {
-            let candidates = effects.iter().map(|e| &e.effect);
-            let best = candidates
-                .chain(alternatives.iter().map(|a| &a.effect))
-                .next();
-            experiment(best.map(String::as_str), &alternatives)
-        });
+        let separating_experiment = closest.and_then(|e| experiment(e, &alternatives));
         if let Some(experiment) = &separating_experiment {
             summary.push(format!("To settle it: {experiment}."));
         }
         Explanation {
             format: EXPLANATION_FORMAT.to_owned(),
             verdict,
-            probability: probability(verdict, effects.len(), p_value),
+            probability,
             summary,
             alternatives,
             hypotheses: self.hypotheses(&recorded, &only, shows),
@@ -291,8 +308,10 @@ impl Answer<'_> {
                     Some(_) => self.recordings.first().map_or_else(Vec::new, blocks),
                     None => vec![],
                 },
+                outputs: if l > 1 { each } else { vec![] },
             },
             parameters,
+            parameters_together: together,
             remaining: Remaining {
                 adequate: p_value >= LEFT,
                 p_value,
@@ -300,10 +319,10 @@ impl Answer<'_> {
                 share_of_removed: None,
                 features: tests,
                 sentence: if p_value >= LEFT {
-                    format!("None of {tests} score tests finds structure in what is left.")
+                    format!("None of {tests} score tests finds structure in the residuals.")
                 } else {
                     format!(
-                        "The strongest of {tests} score tests still takes {:.1} % off what is left.",
+                        "The strongest of {tests} score tests still takes {:.1} % off the residuals.",
                         100.0 * statistic / self.found.values.max(1) as f64
                     )
                 },
@@ -429,6 +448,41 @@ impl Answer<'_> {
             })
         })
         .collect()
+    }
+
+    /// How the estimates differ from the text as a whole where no parameter does alone, and the test of the parameters.
+    fn differs(&self) -> (Differs, Option<JointTest>) {
+        let shift: Vec<f64> = self
+            .whole
+            .nominal()
+            .iter()
+            .zip(&self.found.fit.point)
+            .map(|(text, estimate)| estimate - text)
+            .collect();
+        let parameters = self.plant.spec.parameters().len().min(shift.len());
+        let together = joint_test(&shift[..parameters], &self.covariance);
+        let starts = || joint_test(&shift, &self.covariance).is_some_and(|t| t.rejects());
+        let differs = match together {
+            Some(test) if test.rejects() => Differs::Together(test),
+            _ if starts() => Differs::Starts,
+            _ => Differs::No,
+        };
+        (differs, together)
+    }
+
+    /// The error of the free run over the standard deviation of the innovations: the largest of all outputs.
+    fn strays(&self, outputs: &[OutputFit]) -> f64 {
+        let noise = self.noise();
+        let ratios = outputs.iter().filter_map(|fit| {
+            let of = noise.iter().find(|n| n.output == fit.output)?;
+            let std = of.innovation_std
+                * match of.degrees_of_freedom {
+                    None => 1.0,
+                    Some(degrees) => (degrees / (degrees - 2.0).max(0.0)).sqrt(),
+                };
+            Some(fit.train.augmented.rmse / std)
+        });
+        ratios.filter(|r| r.is_finite()).fold(0.0, f64::max)
     }
 
     fn noise(&self) -> Vec<NoiseFound> {

@@ -127,6 +127,7 @@ impl Answer<'_> {
             alternatives,
             location,
             fit,
+            parameters_together: None,
             parameters: if verdict == Verdict::Consistent {
                 Vec::new()
             } else {
@@ -265,6 +266,7 @@ impl Answer<'_> {
                 .into_iter()
                 .map(|(s, a, b)| [time(s, a), time(s, b)])
                 .collect(),
+            outputs: vec![],
         };
         (table, size, heldout_gain)
     }
