@@ -12,7 +12,7 @@ const ROUNDING: f64 = 1e-10;
 
 impl JointTest {
     /// Whether the estimates differ from the text.
-    pub(super) fn rejects(&self) -> bool {
+    pub(crate) fn rejects(&self) -> bool {
         self.p_value < LEVEL
     }
 }
