@@ -70,6 +70,9 @@ pub struct Explanation {
     pub fit: FitTable,
     /// Parameters of the simulation that the recording contradicts.
     pub parameters: Vec<ParameterChange>,
+    /// Test of all parameters of a plant in equations together, where nothing is missing in it and none differs alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parameters_together: Option<JointTest>,
     /// What the answer still leaves unexplained, with its test.
     pub remaining: Remaining,
     /// The recording that would settle an open question.
@@ -362,6 +365,34 @@ pub struct FitTable {
     pub heldout: Option<FitSteps>,
     /// The blocks, `[from s, to s]`.
     pub heldout_blocks: Vec<[f64; 2]>,
+    /// The same of every output of a plant in equations, worst first; empty where it has one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outputs: Vec<OutputFit>,
+}
+
+/// Fit figures of one of several outputs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OutputFit {
+    /// The output.
+    pub output: String,
+    /// Samples that were fitted.
+    pub train: FitSteps,
+    /// Blocks that were never fitted: models fitted again without them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heldout: Option<FitSteps>,
+}
+
+/// Wald's test: whether estimates differ from the text as a whole.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct JointTest {
+    /// The squared shift from the text, weighed by the inverse of its covariance.
+    pub chi_square: f64,
+    /// Parameters that the recording determines.
+    pub degrees_of_freedom: usize,
+    /// Probability of as large a shift by chance.
+    pub p_value: f64,
+    /// The largest correlation of two estimates, without its sign.
+    pub largest_correlation: f64,
 }
 
 /// A property of the simulation that the recording contradicts.

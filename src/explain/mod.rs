@@ -44,9 +44,9 @@ pub use explain_recordings::{Options, explain};
 pub use explanation::{
     Alternative, AugmentedModel, AugmentedPlant, Curve, Detectable, EXPLANATION_FORMAT,
     EffectFound, EffectSize, EquationMap, Evidence, Explanation, FitFigure, FitSteps, FitTable,
-    HypothesisFit, HypothesisFound, HypothesisRival, HypothesisVerdict, Law, Location, Mechanics,
-    ModelEffect, NoiseFound, ParameterChange, Quantity, Regime, Remaining, SignalReference,
-    SignalTraces, StatePrior, Verdict,
+    HypothesisFit, HypothesisFound, HypothesisRival, HypothesisVerdict, JointTest, Law, Location,
+    Mechanics, ModelEffect, NoiseFound, OutputFit, ParameterChange, Quantity, Regime, Remaining,
+    SignalReference, SignalTraces, StatePrior, Verdict,
 };
 pub use linear::augmented::simulate_augmented::AugmentedError;
 pub use plant_answer::{

@@ -75,6 +75,20 @@ pub(crate) fn quantity(q: &Quantity) -> String {
     }
 }
 
+/// `p = 0.38`, with as many digits as say something.
+pub(crate) fn p_value(p: f64) -> String {
+    if p >= 0.1 {
+        format!("p = {p:.2}")
+    } else if p >= 1e-3 {
+        let short = format!("{p:.1e}").parse::<f64>();
+        short.map_or_else(|_| format!("p = {p:.3}"), |p| format!("p = {p}"))
+    } else if p >= 1e-12 {
+        format!("p = {p:.0e}")
+    } else {
+        "p < 1e-12".to_owned()
+    }
+}
+
 /// Where an effect sits, in words.
 pub(crate) fn place(definition: &Definition, signal: &str) -> String {
     match definition.port() {
@@ -266,6 +280,18 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn probabilities_have_the_digits_that_say_something() {
+        for (p, text) in [
+            (0.384, "p = 0.38"),
+            (0.0234, "p = 0.023"),
+            (4.2e-9, "p = 4e-9"),
+            (0.0, "p < 1e-12"),
+        ] {
+            assert_eq!(p_value(p), text);
+        }
+    }
 
     #[test]
     fn quantities_say_how_certain_they_are() {

@@ -1,11 +1,12 @@
 //! The answer where the simulation is a plant in equations.
 
+mod formula_in_numbers;
 mod hypotheses;
+mod joint_test;
 mod location;
 mod plant_effects;
 mod plant_summary;
 mod question;
-mod significance;
 mod simulate_explained;
 mod stated_probability;
 mod where_to_look;
@@ -16,8 +17,8 @@ pub use simulate_explained::{AugmentedPlantError, Original};
 
 use nalgebra::DMatrix;
 
-use self::plant_summary::as_good;
-use self::significance::differ_from_zero;
+use self::joint_test::joint_test;
+use self::plant_summary::{Differs, Told, as_good};
 use self::stated_probability::probability;
 use self::where_to_look::experiment;
 use self::within_bounds::within_bounds;
@@ -34,7 +35,7 @@ use super::engine::terms::term::Port;
 use super::engine::thresholds::{LEFT, SURE, chance};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
-    FitTable, NoiseFound, ParameterChange, Remaining, SignalTraces, Verdict,
+    FitTable, JointTest, NoiseFound, OutputFit, ParameterChange, Remaining, SignalTraces, Verdict,
 };
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
@@ -44,6 +45,8 @@ use crate::physics::{Hold, ModelSpec, Plant, Span, units_in_words};
 
 /// A parameter is said to differ from the text where it does by so many standard deviations.
 const DIFFERENT: f64 = 3.3;
+/// Level at which the parameters of an effect differ from 0.
+const SIGNIFICANT: f64 = 0.05;
 /// Points of a picture.
 const TRACE_POINTS: usize = 1500;
 
@@ -254,14 +257,35 @@ impl Answer<'_> {
         let heldout_gain = held_out
             .as_ref()
             .map_or(0.0, |h| h.parameters_only.rmse - h.augmented.rmse);
-        let mut summary = self.summary(
+        let mut each: Vec<OutputFit> = (0..l)
+            .map(|o| {
+                let train = steps(o);
+                OutputFit {
+                    output: outputs[o].clone(),
+                    heldout: self.held_out(o, &train),
+                    train,
+                }
+            })
+            .collect();
+        let percent = |o: &OutputFit| o.train.augmented.fit_percent;
+        each.sort_by(|a, b| percent(a).total_cmp(&percent(b)));
+        let alternatives = self.alternatives();
+        let probability = probability(verdict, effects.len(), p_value);
+        let (differs, together) = match verdict {
+            Verdict::Consistent => self.differs(),
+            _ => (Differs::Parameters, None),
+        };
+        let mut summary = self.summary(&Told {
             verdict,
-            &effects,
-            &parameters,
-            &outputs[shows],
-            (&train, held_out.as_ref()),
+            probability,
+            effects: &effects,
+            parameters: &parameters,
+            differs,
+            alternatives: &alternatives,
+            outputs: &each,
             p_value,
-        );
+            strays: self.strays(&each),
+        });
         // What is not sure predicts a fresh recording only where it has explained blocks left out.
         let relied_on = verdict != Verdict::Unexplained || effects.is_empty() || relied_on;
         if !relied_on {
@@ -276,23 +300,16 @@ impl Answer<'_> {
                     .to_owned(),
             );
         }
-        let alternatives = self.alternatives(verdict);
         let closest = effects.first().filter(|_| verdict == Verdict::Unexplained);
         summary.extend(closest.and_then(|e| as_good(e, &alternatives)));
-        let separating_experiment = (verdict == Verdict::Unexplained).then(|| {
-            let candidates = effects.iter().map(|e| &e.effect);
-            let best = candidates
-                .chain(alternatives.iter().map(|a| &a.effect))
-                .next();
-            experiment(best.map(String::as_str), &alternatives)
-        });
+        let separating_experiment = closest.and_then(|e| experiment(e, &alternatives));
         if let Some(experiment) = &separating_experiment {
             summary.push(format!("To settle it: {experiment}."));
         }
         Explanation {
             format: EXPLANATION_FORMAT.to_owned(),
             verdict,
-            probability: probability(verdict, effects.len(), p_value),
+            probability,
             summary,
             alternatives,
             hypotheses: self.hypotheses(&recorded, &only, shows),
@@ -305,8 +322,10 @@ impl Answer<'_> {
                     Some(_) => blocks(self.recordings),
                     None => vec![],
                 },
+                outputs: if l > 1 { each } else { vec![] },
             },
             parameters,
+            parameters_together: together,
             remaining: Remaining {
                 adequate: p_value >= LEFT,
                 p_value,
@@ -314,10 +333,10 @@ impl Answer<'_> {
                 share_of_removed: None,
                 features: tests,
                 sentence: if p_value >= LEFT {
-                    format!("None of {tests} score tests finds structure in what is left.")
+                    format!("None of {tests} score tests finds structure in the residuals.")
                 } else {
                     format!(
-                        "The strongest of {tests} score tests still takes {:.1} % off what is left.",
+                        "The strongest of {tests} score tests still takes {:.1} % off the residuals.",
                         100.0 * statistic / self.found.values.max(1) as f64
                     )
                 },
@@ -356,10 +375,17 @@ impl Answer<'_> {
         }
     }
 
+    /// Whether the recording tells the parameters of an effect from 0, all together: a strength and the level it acts from may be
+    /// known together only. So is an effect without parameters, and one whose covariance is not known.
     fn is_significant(&self, fitted: &Fitted) -> bool {
         let places: Vec<usize> = self.parameters_of(fitted).map(|(_, at)| at).collect();
-        let hypothesis = fitted.hypothesis.is_some();
-        hypothesis || differ_from_zero(&self.found.fit.point, &self.within_bounds, &places)
+        let values: Vec<f64> = places.iter().map(|&p| self.found.fit.point[p]).collect();
+        let covariance = self
+            .within_bounds
+            .select_rows(&places)
+            .select_columns(&places);
+        let test = joint_test(&values, &covariance);
+        fitted.hypothesis.is_some() || test.is_none_or(|t| t.p_value < SIGNIFICANT)
     }
 
     /// The plant as it ran over the first recording, with what was found where that may be relied on. A fresh recording starts elsewhere:
@@ -461,6 +487,41 @@ impl Answer<'_> {
             })
         })
         .collect()
+    }
+
+    /// How the estimates differ from the text as a whole where no parameter does alone, and the test of the parameters.
+    fn differs(&self) -> (Differs, Option<JointTest>) {
+        let shift: Vec<f64> = self
+            .whole
+            .nominal()
+            .iter()
+            .zip(&self.found.fit.point)
+            .map(|(text, estimate)| estimate - text)
+            .collect();
+        let parameters = self.plant.spec.parameters().len().min(shift.len());
+        let together = joint_test(&shift[..parameters], &self.covariance);
+        let starts = || joint_test(&shift, &self.covariance).is_some_and(|t| t.rejects());
+        let differs = match together {
+            Some(test) if test.rejects() => Differs::Together(test),
+            _ if starts() => Differs::Starts,
+            _ => Differs::No,
+        };
+        (differs, together)
+    }
+
+    /// The error of the free run over the standard deviation of the innovations: the largest of all outputs.
+    fn strays(&self, outputs: &[OutputFit]) -> f64 {
+        let noise = self.noise();
+        let ratios = outputs.iter().filter_map(|fit| {
+            let of = noise.iter().find(|n| n.output == fit.output)?;
+            let std = of.innovation_std
+                * match of.degrees_of_freedom {
+                    None => 1.0,
+                    Some(degrees) => (degrees / (degrees - 2.0).max(0.0)).sqrt(),
+                };
+            Some(fit.train.augmented.rmse / std)
+        });
+        ratios.filter(|r| r.is_finite()).fold(0.0, f64::max)
     }
 
     fn noise(&self) -> Vec<NoiseFound> {

@@ -3,17 +3,24 @@
 use std::collections::BTreeMap;
 
 use super::Answer;
+use super::formula_in_numbers::{in_numbers, with_short_literals};
+use crate::explain::document::sentences::{number, quantity};
 use crate::explain::engine::fitting::edit::{Place, user_of};
 use crate::explain::engine::fitting::fitted::Fitted;
+use crate::explain::engine::hypothesis::Hypothesis;
 use crate::explain::engine::screening::curve::Curve;
-use crate::explain::engine::terms::term::Port;
+use crate::explain::engine::terms::term::{Port, Starts};
 use crate::explain::engine::terms::values::filled;
 use crate::explain::engine::thresholds::NEEDED;
-use crate::explain::explanation::{Alternative, EffectFound, Evidence, Law, Quantity, Verdict};
+use crate::explain::explanation::{Alternative, EffectFound, Evidence, Law, Quantity};
 use crate::physics::{Excitation, Hold, Plant, VariableId, parse};
 
 /// Points of a law.
 const LAW_POINTS: usize = 41;
+/// Parameters of an effect that the summary lists.
+const MOST_ESTIMATES: usize = 6;
+/// Points of a curve that it lists.
+const MOST_POINTS: usize = 12;
 /// Step of the differences that give a law's slopes, as a part of a parameter.
 const DIFFERENCE: f64 = 1e-4;
 
@@ -75,6 +82,7 @@ impl Answer<'_> {
             }
             None => equation.clone(),
         };
+        let readable = with_short_literals(&readable, &self.own_text());
         Some(EffectFound {
             hypothesis: fitted.hypothesis.is_some(),
             effect: id.clone(),
@@ -123,6 +131,61 @@ impl Answer<'_> {
             .names
             .iter()
             .filter_map(move |name| Some((name, position(name)?)))
+    }
+
+    /// The text of the plant and of the hypotheses.
+    fn own_text(&self) -> String {
+        let hypotheses = self.hypotheses.iter().map(Hypothesis::text);
+        let texts = std::iter::once(self.plant.spec.text.as_str()).chain(hypotheses);
+        texts.collect::<Vec<_>>().join(" ")
+    }
+
+    /// The parameters of an effect with their standard deviations, or its curve with them; none where there are many. `label` says
+    /// whose they are.
+    pub(super) fn estimates(
+        &self,
+        fitted: &Fitted,
+        effect: &EffectFound,
+        label: &str,
+    ) -> Vec<String> {
+        let mut all: Vec<(&String, &Quantity)> = Vec::new();
+        for name in &fitted.candidate.names {
+            all.extend(effect.parameters.get(name).map(|q| (name, q)));
+        }
+        if let Some(curve) = &fitted.lead.curve {
+            let points: Vec<(f64, &Quantity)> = curve
+                .knots
+                .iter()
+                .copied()
+                .zip(all.iter().map(|(_, q)| *q))
+                .collect();
+            return curve_in_numbers(&fitted.argument, &points)
+                .into_iter()
+                .collect();
+        }
+        if !(1..=MOST_ESTIMATES).contains(&all.len()) {
+            return vec![];
+        }
+        let angular = |name: &str| {
+            let mut shapes = fitted.lead.term.shapes.iter().zip(&fitted.candidate.names);
+            shapes.any(|(shape, n)| n == name && shape.starts == Starts::Peaks)
+        };
+        let each = all.iter().map(|(name, q)| {
+            let period = match angular(name) {
+                true => format!(" (period {})", quantity(&period(q))),
+                false => String::new(),
+            };
+            format!("{name} = {}{period}", quantity(q))
+        });
+        let each: Vec<String> = each.collect();
+        let mut lines = vec![format!("{label}: {}.", each.join("; "))];
+        // The names of an unlisted function say nothing about its form.
+        if effect.effect == "law" {
+            let formula = with_short_literals(&effect.equation, &self.own_text());
+            let formula = in_numbers(&formula, &effect.parameters);
+            lines.push(format!("In numbers: {formula}."));
+        }
+        lines
     }
 
     /// The unit of a parameter in words; empty for a pure number.
@@ -242,19 +305,19 @@ impl Answer<'_> {
         run.outputs.into_iter().next()
     }
 
-    pub(super) fn alternatives(&self, verdict: Verdict) -> Vec<Alternative> {
+    /// What else was tried first, without what is the answer or the closest to one.
+    pub(super) fn alternatives(&self) -> Vec<Alternative> {
         let Some(first) = self.found.steps.first() else {
             return vec![];
         };
-        let best = first.first().map_or(1.0, |f| f.gain).max(1e-9);
-        let skip = usize::from(verdict == Verdict::Named);
-        let mut seen: Vec<String> = first
-            .iter()
-            .take(skip)
-            .map(|f| self.called(&self.plant.spec, f))
+        let own = self.effects().enumerate();
+        let mut seen: Vec<String> = own
+            .map(|(step, f)| self.called(self.spec_before(step), f))
             .collect();
+        let answer = seen.first().map(|id| id.replace('_', " "));
+        let best = first.first().map_or(1.0, |f| f.gain).max(1e-9);
         let mut all = Vec::new();
-        for fitted in first.iter().skip(skip) {
+        for fitted in first {
             let id = self.called(&self.plant.spec, fitted);
             if seen.contains(&id) || fitted.gain <= 0.0 {
                 continue;
@@ -265,13 +328,59 @@ impl Answer<'_> {
                 support: (fitted.gain / best).clamp(0.0, 1.0),
                 criterion_gain: fitted.gain,
                 why_not: format!(
-                    "{}: its criterion gains {:.1}, that of the best {:.1}",
-                    fitted.candidate.equation, fitted.gain, best
+                    "{}: {}",
+                    fitted.candidate.equation,
+                    lost(fitted.gain, best, answer.as_deref())
                 ),
             });
         }
         all
     }
+}
+
+/// Why something is not the answer that gains so much in the criterion; `best` is the gain of the answer, or without one of the
+/// best.
+fn lost(gain: f64, best: f64, answer: Option<&str>) -> String {
+    match answer {
+        Some(answer) if gain <= best => {
+            format!("its criterion gains {gain:.1}, that of {answer} {best:.1}")
+        }
+        Some(answer) => {
+            format!("its criterion gains {gain:.1}, but {answer} explains more of held-out blocks")
+        }
+        None if gain < NEEDED => {
+            format!("its criterion gains {gain:.1}, and {NEEDED:.1} is needed")
+        }
+        None => format!(
+            "its criterion gains {gain:.1} ({NEEDED:.1} is needed), but the held-out comparison does not accept it"
+        ),
+    }
+}
+
+/// The period in seconds of an angular frequency.
+fn period(frequency: &Quantity) -> Quantity {
+    let value = std::f64::consts::TAU / frequency.value.abs();
+    let relative = frequency.std.map(|s| s / frequency.value.abs());
+    Quantity {
+        value,
+        std: relative.map(|r| r * value),
+        unit: "s".to_owned(),
+    }
+}
+
+/// A curve at its knots, or at some of many.
+fn curve_in_numbers(argument: &str, points: &[(f64, &Quantity)]) -> Option<String> {
+    let last = points.len().checked_sub(1)?;
+    let shown = points.len().min(MOST_POINTS);
+    let each: Vec<String> = (0..shown)
+        .map(|i| points[i * last / (shown - 1).max(1)])
+        .map(|(at, value)| format!("{} at {}", quantity(value), number(at)))
+        .collect();
+    let between = match shown == points.len() {
+        true => "linear between these values",
+        false => "these are some of its values",
+    };
+    Some(format!("f({argument}) = {}; {between}.", each.join(", ")))
 }
 
 /// The id in words, as a sentence begins with it.
@@ -284,4 +393,47 @@ fn spoken(id: &str) -> String {
     letters.next().map_or(String::new(), |first| {
         first.to_uppercase().collect::<String>() + letters.as_str()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn measured(value: f64, std: f64, unit: &str) -> Quantity {
+        Quantity {
+            value,
+            std: Some(std),
+            unit: unit.to_owned(),
+        }
+    }
+
+    #[test]
+    fn a_frequency_has_a_period() {
+        let said = quantity(&period(&measured(0.020_943_3, 0.000_195_4, "1/s")));
+        assert_eq!(said, "300.0 +- 2.8 s");
+    }
+
+    #[test]
+    fn a_curve_is_told_at_its_knots() {
+        let values = [measured(1.25, 0.1, "N"), measured(-0.5, 0.05, "N")];
+        let two = [(-2.0, &values[0]), (3.5, &values[1])];
+        assert_eq!(
+            curve_in_numbers("v", &two).unwrap(),
+            "f(v) = 1.25 +- 0.10 N at -2.000, -0.500 +- 0.050 N at 3.500; linear between these values."
+        );
+        let many: Vec<(f64, &Quantity)> = (0..40).map(|i| (f64::from(i), &values[0])).collect();
+        let said = curve_in_numbers("v", &many).unwrap();
+        assert_eq!(said.matches(" at ").count(), MOST_POINTS, "{said}");
+        assert!(said.contains("at 39.00; these are some"), "{said}");
+        assert_eq!(curve_in_numbers("v", &[]), None);
+    }
+
+    #[test]
+    fn what_lost_is_told_why() {
+        let said = |gain, best, answer| lost(gain, best, answer);
+        assert!(said(3.0, 40.0, Some("drag")).ends_with("that of drag 40.0"));
+        assert!(said(30.0, 4.5, Some("drag")).ends_with("explains more of held-out blocks"));
+        assert!(said(4.5, 4.5, None).ends_with("16.0 is needed"));
+        assert!(said(123.3, 123.3, None).ends_with("held-out comparison does not accept it"));
+    }
 }

@@ -1,8 +1,9 @@
 //! Where to look, and what to record next, when no name is given.
 
-use crate::explain::document::sentences::OTHER_AMPLITUDES;
+use crate::explain::engine::fitting::fitted::TIE;
 use crate::explain::engine::terms::documentation::{PARAMETERS, plant_effect};
-use crate::explain::explanation::{Alternative, EquationMap};
+use crate::explain::engine::thresholds::NEEDED;
+use crate::explain::explanation::{Alternative, EffectFound, EquationMap};
 
 /// Places that a sentence lists.
 const MOST_PLACES: usize = 3;
@@ -46,21 +47,23 @@ pub(super) fn places(map: &EquationMap) -> Option<String> {
     ))
 }
 
-/// The recording that tells the best candidate from what looks like it: from a rival of this recording, if one is known to;
-/// where nothing is known, one that shows what is not linear.
-pub(super) fn experiment(best: Option<&str>, rivals: &[Alternative]) -> String {
-    best.and_then(|best| between(best, rivals))
-        .unwrap_or_else(|| OTHER_AMPLITUDES.to_owned())
-}
-
-fn between(best: &str, rivals: &[Alternative]) -> Option<String> {
-    let imitations = plant_effect(best)?.imitations;
+/// The recording that tells the closest candidate from what looks like it: from a rival that explains this recording too, or from
+/// other parameters; none where nothing that looks like it does.
+pub(super) fn experiment(closest: &EffectFound, rivals: &[Alternative]) -> Option<String> {
+    let best = closest.effect.as_str();
+    let imitations = plant_effect(best)
+        .filter(|_| !closest.hypothesis)?
+        .imitations;
     let of = |id: &str| imitations.iter().find(|i| i.effect == id);
+    let explains = |rival: &&Alternative| {
+        let tied = closest.evidence.criterion_gain - rival.criterion_gain <= TIE.0;
+        rival.criterion_gain >= NEEDED || rival.criterion_gain > 0.0 && tied
+    };
     let imitation = rivals
         .iter()
+        .filter(explains)
         .find_map(|rival| of(&rival.effect))
-        .or_else(|| of(PARAMETERS))
-        .or_else(|| imitations.first())?;
+        .or_else(|| of(PARAMETERS))?;
     let other = match imitation.effect {
         PARAMETERS => "other parameters".to_owned(),
         id => id.replace('_', " "),
@@ -75,6 +78,7 @@ fn between(best: &str, rivals: &[Alternative]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::explain::plant_answer::plant_summary::tests::found;
 
     #[test]
     fn the_strongest_places_are_said_and_what_is_within_chance_is_not() {
@@ -101,9 +105,21 @@ mod tests {
             criterion_gain: 20.0,
             why_not: String::new(),
         };
-        let rivals = [rival("leak"), rival("stribeck_friction")];
-        let said = experiment(Some("coulomb_friction"), &rivals);
+        let mut closest = found("coulomb_friction", 24.0);
+        let mut rivals = [rival("leak"), rival("stribeck_friction")];
+        let said = experiment(&closest, &rivals).unwrap();
         assert!(said.ends_with("(tells coulomb friction from stribeck friction)"));
-        assert_eq!(experiment(None, &rivals), OTHER_AMPLITUDES);
+        // A rival that explains nothing needs no other recording.
+        rivals[1].criterion_gain = 3.0;
+        let said = experiment(&closest, &rivals);
+        assert!(said.is_none_or(|said| said.ends_with("from other parameters)")));
+        // A kettle does not cog: nothing of this recording looks like the disturbance.
+        closest.effect = "periodic_disturbance".to_owned();
+        assert_eq!(experiment(&closest, &rivals[..1]), None);
+        // A hypothesis may have the name of an effect.
+        closest.effect = "law".to_owned();
+        assert!(experiment(&closest, &[]).is_some());
+        closest.hypothesis = true;
+        assert_eq!(experiment(&closest, &[]), None);
     }
 }

@@ -20,10 +20,12 @@ pub fn explanation_text(explanation: &Explanation) -> String {
         .map(|e| e.effect.replace('_', " "))
         .collect();
     let mut text = String::new();
-    let _ = if names.is_empty() {
-        writeln!(text, "{word}")
-    } else {
-        writeln!(text, "{word}: {}", names.join(" and "))
+    let names = names.join(" and ");
+    let _ = match (names.as_str(), explanation.verdict) {
+        ("", _) => writeln!(text, "{word}"),
+        // Without a proof it is no name.
+        (closest, Verdict::Unexplained) => writeln!(text, "{word} (closest: {closest})"),
+        (names, _) => writeln!(text, "{word}: {names}"),
     };
     for line in &explanation.summary {
         text.push_str(&wrapped("  ", line));
@@ -42,4 +44,19 @@ pub fn explanation_text(explanation: &Explanation) -> String {
         text.push_str(&wrapped("  ", &line));
     }
     text
+}
+
+#[cfg(all(test, feature = "report"))]
+mod tests {
+    use super::*;
+    use crate::report::page::explanation::fixtures::named;
+
+    #[test]
+    fn what_is_not_proven_is_no_name() {
+        let mut explanation = named();
+        let first = |e: &Explanation| explanation_text(e).lines().next().unwrap().to_owned();
+        assert!(first(&explanation).starts_with("NAMED: "));
+        explanation.verdict = Verdict::Unexplained;
+        assert!(first(&explanation).starts_with("UNEXPLAINED (closest: "));
+    }
 }

@@ -8,6 +8,7 @@ use super::effects_found::{amplitude_name, amplitude_unit, port_name};
 use super::linear_answer::Answer;
 use crate::explain::document::sentences;
 use crate::explain::explanation::{EffectFound, Evidence, Mechanics, Quantity, Remaining};
+use crate::explain::linear::screening::output_adequacy::LEVEL;
 use crate::explain::linear::search::penalties::NEEDED;
 use crate::explain::linear::weak_form::equation_proof::Proof;
 use crate::explain::linear::weak_form::windows::Reading;
@@ -33,11 +34,9 @@ impl Proof {
                     .to_owned(),
             };
         };
-        let sentence = if a.p_value > crate::explain::linear::screening::output_adequacy::LEVEL {
-            format!(
-                "What is left of the force is noise to {} flexible features (p = {:.2}).",
-                a.features, a.p_value
-            )
+        let sentence = if a.p_value > LEVEL {
+            let found = a.sentence(" of the force");
+            format!("{found}.")
         } else if self.adequate {
             let resembles = self.resembles.map_or_else(String::new, |(law, gain)| {
                 format!(

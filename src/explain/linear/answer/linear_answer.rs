@@ -15,7 +15,7 @@ use crate::explain::linear::data::{Data, Series};
 use crate::explain::linear::decision::output_error_decision::Finding;
 use crate::explain::linear::fit::{Fit, Problem};
 use crate::explain::linear::known::Known;
-use crate::explain::linear::screening::output_adequacy::adequacy;
+use crate::explain::linear::screening::output_adequacy::{LEVEL, adequacy};
 use crate::explain::linear::search::cross_validation;
 use crate::explain::linear::search::penalties::NEEDED;
 use crate::identify::Recording;
@@ -127,6 +127,7 @@ impl Answer<'_> {
             alternatives,
             location,
             fit,
+            parameters_together: None,
             parameters: if verdict == Verdict::Consistent {
                 Vec::new()
             } else {
@@ -265,6 +266,7 @@ impl Answer<'_> {
                 .into_iter()
                 .map(|(s, a, b)| [time(s, a), time(s, b)])
                 .collect(),
+            outputs: vec![],
         };
         (table, size, heldout_gain)
     }
@@ -373,12 +375,8 @@ impl Answer<'_> {
             };
         };
         let share = 100.0 * a.share;
-        let sentence = if a.p_value > crate::explain::linear::screening::output_adequacy::LEVEL {
-            format!(
-                "Nothing is left that {} flexible features find (p = {})",
-                a.features,
-                probability_text(a.p_value)
-            )
+        let sentence = if a.p_value > LEVEL {
+            a.sentence("")
         } else if a.holds() {
             format!(
                 "{share:.1} % of what is left is structure still: real, but small beside what was found"
@@ -462,18 +460,5 @@ impl Answer<'_> {
             }
         }
         traces
-    }
-}
-
-/// A probability with as many digits as say something.
-fn probability_text(p: f64) -> String {
-    if p >= 0.1 {
-        format!("{p:.2}")
-    } else if p >= 1e-3 {
-        format!("{p:.1e}")
-            .parse::<f64>()
-            .map_or_else(|_| format!("{p:.3}"), |p| format!("{p}"))
-    } else {
-        format!("{p:.0e}")
     }
 }

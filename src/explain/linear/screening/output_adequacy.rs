@@ -10,6 +10,7 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::score_tests::Bench;
+use crate::explain::document::sentences::p_value;
 use crate::explain::linear::data::{Series, difference};
 use crate::explain::linear::fit::{Fit, Problem};
 use crate::explain::linear::model::structure::Instance;
@@ -52,6 +53,22 @@ pub(crate) struct Adequacy {
 }
 
 impl Adequacy {
+    /// What the features find, where that does not count against the explanation by its significance.
+    pub(crate) fn sentence(&self, of: &str) -> String {
+        let (features, probability) = (self.features, p_value(self.p_value));
+        if self.p_value >= STRUCTURE {
+            return format!(
+                "Nothing is left{of} that {features} flexible features find ({probability})"
+            );
+        }
+        format!(
+            "{features} flexible features find structure in the residual{of} at the {} % level ({probability}), but not at the {} % \
+             level, which would count against the answer",
+            100.0 * STRUCTURE,
+            100.0 * LEVEL
+        )
+    }
+
     /// Whether the explanation suffices.
     pub(crate) fn holds(&self) -> bool {
         self.p_value > LEVEL

@@ -99,7 +99,20 @@ pub(super) fn sentence(text: &str) -> Option<String> {
 /// The verdict in one sentence.
 pub(super) fn headline(of: &Explanation) -> String {
     let effects: Vec<String> = of.effects.iter().map(effect_at).collect();
+    let together = of.parameters_together.is_some_and(|t| t.rejects());
     match (of.verdict, of.effects.as_slice()) {
+        (Verdict::Consistent, _) if !of.remaining.adequate => {
+            "No known effect improves the simulation significantly, but the residual is not white."
+                .to_owned()
+        }
+        (Verdict::Consistent, _) if together => {
+            "The physics of the simulation is right; its parameters differ, but only together."
+                .to_owned()
+        }
+        (Verdict::Parameters, _) if !of.remaining.adequate => {
+            "Other parameters fit the recording better, but the residual is still not white."
+                .to_owned()
+        }
         (Verdict::Consistent, _) => {
             "The simulation agrees with the recording: nothing differs beyond noise.".to_owned()
         }

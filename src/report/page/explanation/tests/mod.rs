@@ -124,6 +124,9 @@ fn every_verdict_has_its_sentence() {
         "Coulomb friction at position or, about as likely, Stribeck friction.",
     );
     says(&consistent(), "The simulation agrees with the recording");
+    let mut left = consistent();
+    left.remaining.adequate = false;
+    says(&left, "the residual is not white");
     says(&parameters(), "its parameters are not.");
     says(&unexplained(), "that no known effect explains.");
     assert!(!page(&unexplained()).contains("why they lost"));

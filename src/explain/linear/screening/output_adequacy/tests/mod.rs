@@ -180,3 +180,28 @@ fn another_class_is_asked_over_what_it_removed() {
         assert_eq!(Adequacy { share, ..objected }.holds(), holds);
     }
 }
+
+#[test]
+fn structure_at_a_lower_level_is_not_called_nothing() {
+    let said = |p_value: f64| {
+        let found = Adequacy {
+            features: 54,
+            p_value,
+            share: 0.01,
+            share_of_error: 0.01,
+            of_removed: f64::INFINITY,
+            tolerated: OF_REMOVED,
+        };
+        assert!(found.holds());
+        found.sentence("")
+    };
+    assert_eq!(
+        said(0.38),
+        "Nothing is left that 54 flexible features find (p = 0.38)"
+    );
+    assert_eq!(
+        said(3e-4),
+        "54 flexible features find structure in the residual at the 1 % level (p = 3e-4), but not at the 0.01 % level, which \
+         would count against the answer"
+    );
+}
