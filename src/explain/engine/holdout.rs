@@ -62,6 +62,12 @@ impl HeldOut {
         1.0 - self.over(other).powi(2)
     }
 
+    /// Whether more than half of the mean square of another is gone in every output.
+    pub(crate) fn explains_every_output(&self, other: &Self) -> bool {
+        let mut outputs = self.squares.iter().zip(&other.squares);
+        outputs.all(|(own, other)| *own <= EXPLAINED * other)
+    }
+
     /// Whether free runs follow the recordings clearly better than their means do.
     pub(crate) fn follows(&self) -> bool {
         ratio(&self.squares, &self.variances) < FOLLOWS && self.stays()

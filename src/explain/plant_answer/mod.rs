@@ -186,7 +186,8 @@ impl Answer<'_> {
             Some([without, with]) => {
                 let closely = with.follows_closely();
                 let removes = with.removed(without) >= EXPLAINED;
-                (without.follows() || closely, removes && closely, removes)
+                let every = with.explains_every_output(without);
+                (without.follows() || closely, removes && closely, every)
             }
         };
         let effects: Vec<EffectFound> = self
@@ -286,7 +287,7 @@ impl Answer<'_> {
             p_value,
             strays: self.strays(&each),
         });
-        // What is not sure predicts a fresh recording only where it has explained blocks left out.
+        // What is not sure predicts a fresh recording only where it has explained blocks left out, in every output.
         let relied_on = verdict != Verdict::Unexplained || effects.is_empty() || relied_on;
         if !relied_on {
             summary.push(
