@@ -113,6 +113,6 @@ fn play_in_a_shaft_that_the_simulator_has_is_found_with_its_width() {
     assert_eq!(said["verdict"], "named", "{}", said["summary"]);
     assert_eq!(said["effects"].as_array().map(Vec::len), Some(1));
     assert_eq!(said["effects"][0]["effect"], "backlash");
-    let (play, std) = parameter(&said, "backlash_g");
+    let (play, std) = parameter(&said, "gap_g");
     assert!((play - 0.03).abs() < 4.0 * std + 0.0006, "{play} +- {std}");
 }

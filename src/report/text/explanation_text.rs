@@ -45,18 +45,3 @@ pub fn explanation_text(explanation: &Explanation) -> String {
     }
     text
 }
-
-#[cfg(all(test, feature = "report"))]
-mod tests {
-    use super::*;
-    use crate::report::page::explanation::fixtures::named;
-
-    #[test]
-    fn what_is_not_proven_is_no_name() {
-        let mut explanation = named();
-        let first = |e: &Explanation| explanation_text(e).lines().next().unwrap().to_owned();
-        assert!(first(&explanation).starts_with("NAMED: "));
-        explanation.verdict = Verdict::Unexplained;
-        assert!(first(&explanation).starts_with("UNEXPLAINED (closest: "));
-    }
-}

@@ -5,6 +5,7 @@ use super::explanation_page;
 use super::fixtures::{all, consistent, family, load_step, named, parameters, unexplained};
 use crate::explain::{Explanation, FitTable, Location, Verdict};
 use crate::report::page::tests;
+use crate::report::text::explanation_text;
 
 /// Without the library that draws.
 fn page(of: &Explanation) -> String {
@@ -216,4 +217,13 @@ fn only_the_strongest_bands_carry_a_label() {
     let page = page(&e);
     assert_eq!(page.matches("dB over noise").count(), 8);
     assert_eq!(page.matches("\"label\":\"+").count(), 3);
+}
+
+#[test]
+fn what_is_not_proven_is_no_name_on_the_terminal() {
+    let mut explanation = named();
+    let first = |e: &Explanation| explanation_text(e).lines().next().unwrap().to_owned();
+    assert!(first(&explanation).starts_with("NAMED: "));
+    explanation.verdict = Verdict::Unexplained;
+    assert!(first(&explanation).starts_with("UNEXPLAINED (closest: "));
 }
