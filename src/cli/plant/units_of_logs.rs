@@ -45,11 +45,11 @@ pub(crate) fn units_of_logs(
                 Comparison::Factor(factor) => {
                     let (what, remedy) = match factor < 1.0 {
                         true => (
-                            format!("1 {declared} is {} {unit}", rounded(1.0 / factor)),
+                            format!("{} is {} {unit}", one(declared), rounded(1.0 / factor)),
                             format!("divide the column by {}", rounded(1.0 / factor)),
                         ),
                         false => (
-                            format!("1 {unit} is {} {declared}", rounded(factor)),
+                            format!("{} is {} {declared}", one(unit), rounded(factor)),
                             format!("multiply the column by {}", rounded(factor)),
                         ),
                     };
@@ -64,6 +64,12 @@ pub(crate) fn units_of_logs(
                          header is wrong, take the unit out of it"
                     )
                 }
+                Comparison::Line(factor, offset) => anyhow::bail!(
+                    "{begin}: multiply the column by {}, add {} and write {declared} into its header; if the header is wrong, take \
+                     the unit out of it",
+                    rounded(factor),
+                    rounded(offset)
+                ),
                 Comparison::Offset(offset) => said.push(format!(
                     "{begin}: add {} to the column, unless the equations have only differences of temperatures",
                     rounded(offset)
@@ -75,4 +81,12 @@ pub(crate) fn units_of_logs(
         }
     }
     Ok(said)
+}
+
+/// One of a unit.
+fn one(unit: &str) -> String {
+    match unit {
+        "1" | "-" => "1".to_owned(),
+        _ => format!("1 {unit}"),
+    }
 }

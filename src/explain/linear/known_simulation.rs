@@ -254,6 +254,11 @@ fn check_unit(name: &str, ours: &Channel, theirs: &Channel) -> Result<(), Explai
         Comparison::Alike => return Ok(()),
         Comparison::Factor(factor) => format!(" (1 {simulated} is {} {recorded})", rounded(factor)),
         Comparison::Offset(offset) => format!(" (add {} to the simulation)", rounded(offset)),
+        Comparison::Line(factor, offset) => format!(
+            " (multiply the simulation by {} and add {})",
+            rounded(factor),
+            rounded(offset)
+        ),
         Comparison::Dimension => String::new(),
     };
     Err(ExplainError::Unit {

@@ -22,6 +22,8 @@ pub(crate) enum Comparison {
     Factor(f64),
     /// The same size, and another zero: add this to numbers in the first.
     Offset(f64),
+    /// Another size and another zero: multiply numbers in the first by this, and add that.
+    Line(f64, f64),
     /// Different quantities.
     Dimension,
 }
@@ -133,12 +135,12 @@ fn between(a: &Reading, b: &Reading) -> Option<Comparison> {
     if !factor.is_finite() || (a.sized.angle - b.sized.angle).abs() > EQUAL {
         return None;
     }
-    if (factor - 1.0).abs() > EQUAL {
-        return Some(Comparison::Factor(factor));
-    }
-    Some(match a.zero - b.zero {
-        0.0 => Comparison::Alike,
-        offset => Comparison::Offset(offset / b.sized.size),
+    let offset = (a.zero - b.zero) / b.sized.size;
+    Some(match ((factor - 1.0).abs() > EQUAL, offset != 0.0) {
+        (false, false) => Comparison::Alike,
+        (false, true) => Comparison::Offset(offset),
+        (true, false) => Comparison::Factor(factor),
+        (true, true) => Comparison::Line(factor, offset),
     })
 }
 
@@ -269,7 +271,6 @@ mod tests {
             ("ls-1", "m3/h", 3.6),
             ("mA.h", "C", 3.6),
             ("%", "1", 0.01),
-            ("F", "K", 5.0 / 9.0),
             ("g", "m/s2", 9.80665),
             ("mph", "km/h", 1.609344),
         ] {
@@ -279,6 +280,10 @@ mod tests {
             assert!((found / expected - 1.0).abs() < 1e-9, "{a} {b}: {found}");
         }
         assert_eq!(compare("°C", "K"), Comparison::Offset(ICE));
+        let Comparison::Line(factor, offset) = compare("degC", "°F") else {
+            panic!("{:?}", compare("degC", "°F"));
+        };
+        assert!((factor - 1.8).abs() < 1e-12 && (offset - 32.0).abs() < 1e-9);
         assert_eq!(compare("K", "degC"), Comparison::Offset(-ICE));
         for (a, b) in [("mm", "m/s"), ("V", "A"), ("N", "N.m"), ("kW.h", "kW")] {
             assert_eq!(compare(a, b), Comparison::Dimension, "{a} {b}");
