@@ -120,7 +120,7 @@ fn slow_variables(spec: &ModelSpec, root: ExpressionId) -> Vec<VariableId> {
             found.push(v);
         }
         // In the order of the text.
-        let operands: Vec<ExpressionId> = node.operands().into_iter().collect();
+        let operands: Vec<ExpressionId> = node.operands().collect();
         waiting.extend(operands.into_iter().rev());
     }
     found
