@@ -17,5 +17,6 @@ mod plant_held_out;
 mod plant_hypotheses;
 mod plant_initial_states;
 mod plant_long;
+mod plant_motion;
 mod plant_parts;
 mod plant_search;

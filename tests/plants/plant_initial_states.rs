@@ -34,7 +34,7 @@ end Heater;
 "#;
 
 /// Two states by Runge-Kutta steps of a quarter of a sample, both at each sample.
-fn run(
+pub(crate) fn run(
     rate: impl Fn([f64; 2]) -> [f64; 2],
     mut x: [f64; 2],
     samples: usize,
@@ -58,7 +58,7 @@ fn run(
     all
 }
 
-fn noise(seed: u64) -> impl FnMut() -> f64 {
+pub(crate) fn noise(seed: u64) -> impl FnMut() -> f64 {
     let mut dice = ChaCha8Rng::seed_from_u64(seed);
     move || StandardNormal.sample(&mut dice)
 }
