@@ -13,10 +13,11 @@ mod physics_simulate;
 mod physics_texts;
 mod plant_cli;
 mod plant_explain;
+mod plant_gravity;
 mod plant_held_out;
 mod plant_hypotheses;
 mod plant_initial_states;
 mod plant_long;
-mod plant_motion;
+
 mod plant_parts;
 mod plant_search;

@@ -407,3 +407,50 @@ fn refutes(study: &Study, least_squares: &Fit, point: &[f64]) -> Option<bool> {
     let law = ChiSquared::new(numbers as f64).ok()?;
     Some(law.sf(share * excess.max(0.0)) < MISSPECIFIED)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::Noise;
+
+    fn rival(estimator: Estimator, whole: f64, misspecified: bool) -> Rival {
+        Rival {
+            search: 0,
+            accepted: 0,
+            estimator,
+            fit: Fit {
+                form: Form::FreeRun,
+                point: vec![],
+                noise: Noise::unit(1),
+                deviance: 0.0,
+                criterion: 0.0,
+            },
+            nearest: None,
+            held_out: HeldOut {
+                squares: vec![1.0],
+                variances: vec![2.0],
+            },
+            whole,
+            misspecified,
+        }
+    }
+
+    /// Of errors of 0.2 and more twice the mean square begins at 0.283.
+    #[test]
+    fn least_squares_refutes_what_leaves_twice_its_mean_square() {
+        let kept = |given: f64, misspecified: bool| {
+            let mut all = vec![
+                rival(Estimator::Given, 9.0, true),
+                rival(Estimator::Likelihood, 0.21, true),
+                rival(Estimator::FreeRun, 0.2, false),
+                rival(Estimator::Given, given, misspecified),
+            ];
+            // The first belongs to another number of effects.
+            drop_refuted(&mut all, 1);
+            all.len()
+        };
+        assert_eq!(kept(0.28, true), 4);
+        assert_eq!(kept(0.29, true), 3);
+        assert_eq!(kept(0.29, false), 4);
+    }
+}
