@@ -298,9 +298,9 @@ mod tests {
         let text = "model Motor
                parameter Real R(unit=\"Ohm\") = 1; parameter Real J = 1;
                input Real u(unit=\"V\"); input Real d(unit=\"K\"); output Real y(unit=\"rad\");
-               Real phi(unit=\"rad\"); Real w(unit=\"rad/s\"); Real T(unit=\"K\");
+               Real phi(unit=\"rad\"); Real w(unit=\"rad/s\"); Real T(unit=\"K\"); Real psi(unit=\"rad\");
              equation
-               der(phi) = w; J*der(w) = u/R - w; der(T) = u*w - (T - d); y = phi;
+               der(psi) = w - psi; der(phi) = w; J*der(w) = u/R - w; der(T) = u*w - (T - d); y = phi;
              end Motor;";
         let spec = parse(text).unwrap();
         let wave = |k: usize| (0.3 * k as f64).sin();
