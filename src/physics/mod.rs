@@ -30,5 +30,7 @@ pub use simulation::{
 pub use spec::{Equation, ModelSpec, Unknown, Variable, VariableKind};
 pub(crate) use syntax::{Token, function_names, is_reserved, nearest, tokens};
 pub use syntax::{diagnose, parse};
-pub(crate) use units::{Comparison, compare, other_clock, rounded, unit_conflicts, units_in_words};
+#[cfg(feature = "cli")]
+pub(crate) use units::other_clock;
+pub(crate) use units::{Comparison, compare, rounded, unit_conflicts, units_in_words};
 pub use units::{Unit, UnknownUnit, check_units, unknown_units};

@@ -3,6 +3,7 @@
 mod check;
 mod compare;
 mod infer;
+#[cfg(feature = "cli")]
 mod seconds;
 mod symbols;
 #[cfg(test)]
@@ -15,6 +16,7 @@ pub use check::check_units;
 pub(crate) use check::unit_conflicts;
 pub(crate) use compare::{Comparison, compare, rounded};
 pub(crate) use infer::units_in_words;
+#[cfg(feature = "cli")]
 pub(crate) use seconds::other_clock;
 pub(crate) use types::type_unit;
 pub use unknown::{UnknownUnit, unknown_units};

@@ -91,6 +91,10 @@ pub(crate) fn unit_conflicts(spec: &ModelSpec) -> Vec<SpecError> {
 
 /// Parts of one dimension and different size, which have to be alike.
 #[derive(Debug, Clone, Copy)]
+#[cfg_attr(
+    not(feature = "cli"),
+    allow(dead_code, reason = "the command warns of them")
+)]
 pub(super) struct SizeConflict {
     /// What holds both.
     pub(super) at: Span,
@@ -99,6 +103,7 @@ pub(super) struct SizeConflict {
 }
 
 /// All parts of different size, in the order of the text.
+#[cfg(feature = "cli")]
 pub(super) fn size_conflicts(spec: &ModelSpec) -> Vec<SizeConflict> {
     let mut checker = Checker::examined(spec);
     checker.equations();

@@ -99,6 +99,7 @@ pub(crate) fn compare(one: &str, other: &str) -> Comparison {
 }
 
 /// Symbols of time other than the second, as far as [`compare`] reads the text: `mm/d` has `d`.
+#[cfg(feature = "cli")]
 pub(crate) fn slow_time(text: &str) -> Option<&'static str> {
     let symbols = text.split(|c: char| !c.is_alphabetic());
     symbols
