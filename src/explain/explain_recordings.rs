@@ -132,19 +132,16 @@ fn explain_free(
         troubles: Vec::new(),
         interpolated: false,
     };
-    let equations = columns::equations(&checked);
-    let found = equations.as_ref().and_then(|e| {
-        let mut explanation = columns::explain_equations(e, &checked, &options.without)?;
-        if e.misfit > columns::REPRODUCED && !explanation.remaining.adequate {
-            doubt(&mut explanation);
+    let sensors = || columns::explain_sensors(&checked, &options.without);
+    let by_equations = || {
+        let equations = columns::equations(&checked)?;
+        let mut explanation = columns::explain_equations(&equations, &checked, &options.without)?;
+        if equations.misfit > columns::REPRODUCED {
+            doubt_rough(&mut explanation);
         }
-        Some(explanation)
-    });
-    let sensors = columns::explain_sensors(&checked, &options.without);
-    let found = match (found, sensors) {
-        (Some(equations), Some(sensors)) if stands_in(&sensors, &equations) => Some(sensors),
-        (equations, sensors) => equations.or(sensors),
+        Some(unless_closer(explanation, sensors()))
     };
+    let found = by_equations().or_else(sensors);
     let name = || match simulation {
         Simulation::Outputs(logs) => logs.first().map(|log| log.name.clone()),
         Simulation::Model(_, name) => Some(name.clone()),
@@ -152,6 +149,19 @@ fn explain_free(
     found.ok_or_else(|| ExplainError::NoEquations {
         name: name().unwrap_or_default(),
     })
+}
+
+/// What rough equations leave may be their own error, and a name beside it stand for that.
+fn doubt_rough(explanation: &mut Explanation) {
+    if !explanation.remaining.adequate {
+        doubt(explanation);
+    }
+}
+
+/// The explanation, or another one whose run follows the recording closer.
+fn unless_closer(explanation: Explanation, other: Option<Explanation>) -> Explanation {
+    let closer = other.filter(|o| stands_in(o, &explanation));
+    closer.unwrap_or(explanation)
 }
 
 fn explain_nonlinear(
@@ -178,8 +188,7 @@ fn explain_nonlinear(
     {
         // Equations with many numbers may reproduce columns that were made by others. A sensor that explains the recording as
         // closely leaves the simulator as it is.
-        let sensors = sensors().filter(|s| stands_in(s, &explanation));
-        return Ok(sensors.unwrap_or(explanation));
+        return Ok(unless_closer(explanation, sensors()));
     }
     let known = simulator.learn(checked)?;
     let found = inquire(&known, checked.mask(&known.data), allowed);
@@ -195,10 +204,7 @@ fn explain_nonlinear(
     }
     Ok(match by_equations() {
         Some(mut equations) if stands_in(&equations, &explanation) => {
-            // What rough equations leave may be their own error, and a name beside it stand for that.
-            if !equations.remaining.adequate {
-                doubt(&mut equations);
-            }
+            doubt_rough(&mut equations);
             equations
         }
         Some(equations) if agree(&equations, &explanation) => explanation,

@@ -312,10 +312,10 @@ fn rivals(found: &Found, search: usize, recordings: &[PlantRecording], hold: Hol
             .map(|(estimator, fit)| (estimator, fit, false))
             .collect();
         let mut nearest = None;
-        let others: Vec<Fit> = fits.iter().map(|f| f.1.clone()).collect();
+        let points: Vec<&[f64]> = fits.iter().map(|f| f.1.point.as_slice()).collect();
         if of_search == Estimator::Likelihood
             && let Some((least_squares, refuted, next)) =
-                by_least_squares(plant, &others, nested, recordings, hold)
+                by_least_squares(plant, &points, nested, recordings, hold)
         {
             nearest = next;
             for ((.., misspecified), refuted) in fits.iter_mut().zip(refuted) {
@@ -360,14 +360,14 @@ fn drop_refuted(rivals: &mut Vec<Rival>, first: usize) {
     rivals.extend(kept.into_iter().filter(|r| !refuted(r)));
 }
 
-/// The least squares fit of the free run; whether it refutes each of the other fits, of which the first is the likelihood's; and
+/// The least squares fit of the free run; whether it refutes each of the other points, of which the first is the likelihood's; and
 /// the least squares fit next to that.
 ///
 /// Least squares has summits of its own: it starts from the likelihood's point, and from `nested`, the fit with an effect less; of
 /// the plant alone where [`estimate`](crate::physics::estimate::estimate) starts.
 fn by_least_squares(
     plant: &Plant,
-    others: &[Fit],
+    others: &[&[f64]],
     nested: Option<Vec<f64>>,
     recordings: &[PlantRecording],
     hold: Hold,
@@ -375,14 +375,14 @@ fn by_least_squares(
     let options = all_free(plant, hold, Estimator::FreeRun);
     let limited = plant.clone().with_most_steps(MOST_STEPS);
     let study = Study::new(&limited, recordings, &options).ok()?;
-    let from_likelihood = study.least_squares(&others.first()?.point);
+    let from_likelihood = study.least_squares(others.first()?);
     let otherwise = match nested {
         None => study.fit(Some(Form::FreeRun)).ok(),
         Some(nested) => study.least_squares(&nested),
     };
     let fit = (from_likelihood.iter().cloned().chain(otherwise))
         .min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
-    let refuted = |other: &Fit| refutes(&study, &fit, &other.point).unwrap_or(false);
+    let refuted = |other: &&[f64]| refutes(&study, &fit, other).unwrap_or(false);
     let refuted = others.iter().map(refuted).collect();
     let nearest = from_likelihood.filter(|near| study.follows(near));
     study.follows(&fit).then_some((fit, refuted, nearest))

@@ -134,6 +134,14 @@ fn still_shows((study, fit): (&Study, &Fit), lead: &Lead, spec: &ModelSpec) -> b
     left.is_none_or(|left| left < FOLLOWS * FOLLOWS)
 }
 
+/// When the recordings begin and the longest ends.
+fn duration(recordings: &[PlantRecording]) -> (f64, f64) {
+    let begin = recordings.first().map_or(0.0, |r| r.start_time);
+    let length = |r: &PlantRecording| r.samples() as f64 * r.sample_time;
+    let longest = recordings.iter().map(length).fold(0.0, f64::max);
+    (begin, begin + longest)
+}
+
 /// What a step has found.
 pub(super) struct Step {
     /// Candidates, best first.
@@ -310,7 +318,10 @@ pub(super) fn step(stage: &Stage) -> Step {
             Some(Fitted {
                 depends: argument.map_or_else(Vec::new, |a| plant.spec.names(&a.variables)),
                 argument: argument.map_or_else(String::new, |a| a.expression.clone()),
-                range: argument.map_or((0.0, 0.0), |a| (a.quantile(0.0), a.quantile(1.0))),
+                range: argument.map_or_else(
+                    || duration(recordings),
+                    |a| (a.quantile(0.0), a.quantile(1.0)),
+                ),
                 travel: argument.map_or(0.0, |a| a.travel(recordings[0].sample_time)),
                 shapes: best.point[parameters..][..lead.shapes.len()].to_vec(),
                 lead,

@@ -24,7 +24,7 @@ pub(crate) struct Fitted {
     pub(crate) depends: Vec<String>,
     /// The same as an expression.
     pub(crate) argument: String,
-    /// Values that the argument had, and the range of its integral.
+    /// Values that the argument had, or times of the recordings where there is none, and the range of its integral.
     pub(crate) range: (f64, f64),
     pub(crate) travel: f64,
     /// Fitted values of the shapes.

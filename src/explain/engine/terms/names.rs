@@ -4,6 +4,7 @@ use crate::physics::{Binary, Equation, ModelSpec, Node, Unknown, VariableId, Var
 
 use crate::explain::engine::fitting::edit::{Place, user_of};
 use crate::explain::engine::fitting::fitted::Fitted;
+use crate::explain::engine::terms::library::TIMES;
 use crate::explain::engine::terms::term::{Needs, Port, Term};
 
 /// What kind of quantity an argument is.
@@ -294,7 +295,19 @@ pub(in crate::explain::engine) fn heats_itself(
 /// same name may enter two equations, that of the variable it is a function of, else that of a derivative, else of an output.
 pub(crate) fn rank(spec: &ModelSpec, found: &Fitted) -> u8 {
     let variables: Vec<VariableId> = found.depends.iter().filter_map(|n| spec.find(n)).collect();
-    rank_of(spec, found.lead.term, found.lead.place, &variables)
+    let of_term = rank_of(spec, found.lead.term, found.lead.place, &variables);
+    match found.shapes.first() {
+        // A load that is there from the beginning is a constant, which comes before it.
+        Some(&at) if found.lead.term.id == "load_step" && is_early(at, found.range) => {
+            of_term + PLACES * (CONSTANT + 1)
+        }
+        _ => of_term,
+    }
+}
+
+/// Whether an instant comes before all that a search starts from.
+fn is_early(instant: f64, (begin, end): (f64, f64)) -> bool {
+    instant < begin + TIMES[0] * (end - begin)
 }
 
 /// The part of the rank that its name has.
@@ -304,6 +317,9 @@ pub(crate) fn name_rank(spec: &ModelSpec, found: &Fitted) -> u8 {
 
 /// Ranks of one name at different places.
 const PLACES: u8 = 4;
+
+/// Rank of the name of a load without an instant.
+const CONSTANT: u8 = 3;
 
 /// Ranks below this are names of their own.
 pub(in crate::explain::engine) const SPECIFIC: u8 = PLACES;
@@ -334,7 +350,7 @@ pub(in crate::explain::engine) fn rank_of(
         Place::Parameter(_) => (1, 0),
     };
     let of_name = match called(spec, term, place, variables) {
-        "load_step" if term.id != "load_step" => 3 + of_place,
+        "load_step" if term.id != "load_step" => CONSTANT + of_place,
         "law" | "cross_coupling" => 4 + of_place,
         "input_curve" | "parameter_change" => 2 + of_place,
         _ => of_place,
@@ -359,6 +375,12 @@ mod tests {
             Place::Equation(place),
             &[spec.find(of).unwrap()],
         )
+    }
+
+    #[test]
+    fn a_step_before_the_first_start_of_a_search_is_early() {
+        assert!(is_early(11.9, (10.0, 50.0)));
+        assert!(!is_early(12.1, (10.0, 50.0)));
     }
 
     #[test]
