@@ -84,24 +84,27 @@ fn cooling(start: [f64; 2], seed: u64) -> (String, Vec<f64>) {
 fn a_second_mass_that_starts_elsewhere_predicts_another_recording() {
     let folder = Folder::new();
     folder.text("cup.mo", CUP);
-    folder.text("log.csv", &cooling([90.0, 20.0], 1).0);
     let (fresh, water) = cooling([60.0, 75.0], 2);
     folder.text("fresh.csv", &fresh);
-    let explain = [
-        "explain",
-        "log.csv",
-        "--simulation",
-        "cup.mo",
-        "--output",
-        "e.json",
-    ];
-    folder.run(&explain).ok();
-    let said = json(&folder.join("e.json"));
-    assert_eq!(
-        said["effects"][0]["effect"], "extra_mode",
-        "{}",
-        said["summary"]
-    );
+    // With most noises a fit of four attempts a step did not move, and slow noise stood for the cup.
+    for seed in [1, 3, 4, 5] {
+        folder.text("log.csv", &cooling([90.0, 20.0], seed).0);
+        let explain = [
+            "explain",
+            "log.csv",
+            "--simulation",
+            "cup.mo",
+            "--output",
+            "e.json",
+        ];
+        folder.run(&explain).ok();
+        let said = json(&folder.join("e.json"));
+        let summary = &said["summary"];
+        assert_eq!(
+            said["effects"][0]["effect"], "extra_mode",
+            "{seed}: {summary}"
+        );
+    }
     let simulate = [
         "simulate",
         "e.json",

@@ -14,7 +14,7 @@ pub(crate) const IMITATED: f64 = 0.3;
 pub(crate) const GLANCE: Effort = Effort {
     iterations: 4,
     settled: 0.3,
-    attempts: 4,
+    attempts: 8,
 };
 /// Error of a step where fits are only compared with each other.
 pub(crate) const GLANCED_ACCURACY: f64 = 1e-6;

@@ -74,13 +74,16 @@ pub(super) fn minimise(
                 damping *= MORE;
                 continue;
             };
-            let trial: Vec<f64> = point
-                .iter()
-                .zip(&step)
-                .zip(ranges)
-                .map(|((p, s), r)| (p + s.clamp(-r.reach, r.reach)).clamp(r.min, r.max))
+            let trial: Vec<f64> = (point.iter().zip(&step).zip(ranges))
+                .map(|((p, s), r)| (p + s).clamp(r.min, r.max))
                 .collect();
-            if trial == *point || foretold(&curvature, &descent, point, &trial) < effort.settled {
+            let foretold = foretold(&curvature, &descent, point, &trial);
+            // Several numbers at their limits together may lead uphill; a shorter step does not.
+            if foretold < 0.0 {
+                damping *= MORE;
+                continue;
+            }
+            if trial == *point || foretold < effort.settled {
                 break;
             }
             match objective.deviance(&trial) {
@@ -111,7 +114,7 @@ fn foretold(curvature: &DMatrix<f64>, descent: &DVector<f64>, from: &[f64], to: 
     2.0 * descent.dot(&step) - step.dot(&(curvature * &step))
 }
 
-/// The damped step. What is at a bound and would leave it is held there.
+/// The damped step. What is at a bound and would leave it is held there, and nothing moves further than its reach.
 fn step(
     curvature: &DMatrix<f64>,
     descent: &DVector<f64>,
@@ -126,7 +129,7 @@ fn step(
         })
         .collect();
     let mut step = vec![0.0; point.len()];
-    // A step that meets a bound ends there, and the others are found again for it.
+    // A step that meets a limit ends there, and the others are found again for it.
     for _ in 0..=point.len() {
         if free.is_empty() {
             return Some(step);
@@ -156,7 +159,9 @@ fn step(
             return None;
         }
         for &i in &free.clone() {
-            let bounded = (point[i] + step[i]).clamp(ranges[i].min, ranges[i].max) - point[i];
+            let range = &ranges[i];
+            let reached = step[i].clamp(-range.reach, range.reach);
+            let bounded = reached.clamp(range.min - point[i], range.max - point[i]);
             if bounded != step[i] {
                 step[i] = bounded;
                 free.retain(|&j| j != i);
@@ -169,4 +174,88 @@ fn step(
         free.iter().for_each(|&i| step[i] = 0.0);
     }
     Some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sum of squares with its minimum 0 at `lowest`.
+    struct Quadratic {
+        curvature: DMatrix<f64>,
+        lowest: DVector<f64>,
+    }
+
+    impl Objective for Quadratic {
+        fn deviance(&mut self, point: &[f64]) -> Option<f64> {
+            let from = DVector::from_row_slice(point) - &self.lowest;
+            Some(from.dot(&(&self.curvature * &from)))
+        }
+
+        fn curvature(&mut self, point: &[f64]) -> Option<(DMatrix<f64>, DVector<f64>)> {
+            let to = &self.lowest - DVector::from_row_slice(point);
+            Some((self.curvature.clone(), &self.curvature * to))
+        }
+    }
+
+    fn range(reach: f64) -> Range {
+        Range {
+            min: -10.0,
+            max: 10.0,
+            reach,
+        }
+    }
+
+    #[test]
+    fn what_does_not_meet_a_limit_is_found_again_for_what_does() {
+        let curvature = DMatrix::from_row_slice(2, 2, &[2.0, 1.0, 1.0, 2.0]);
+        let lowest = DVector::from_row_slice(&[3.0, -1.0]);
+        let descent = &curvature * &lowest;
+        let at = |range: Range| {
+            step(
+                &curvature,
+                &descent,
+                &[0.0, 0.0],
+                &[range, self::range(9.0)],
+                0.0,
+            )
+            .unwrap()
+        };
+        let bounded = Range {
+            max: 1.0,
+            ..range(9.0)
+        };
+        for limited in [at(range(1.0)), at(bounded)] {
+            assert!((limited[0] - 1.0).abs() < 1e-9, "{limited:?}");
+            assert!(limited[1].abs() < 1e-9, "{limited:?}");
+        }
+        let free = at(range(9.0));
+        assert!((free[0] - 3.0).abs() < 1e-8 && (free[1] + 1.0).abs() < 1e-8);
+    }
+
+    /// Both numbers meet their reach in the first step, (0.1, 1.9), which leads uphill.
+    #[test]
+    fn a_step_that_limits_turn_uphill_is_made_shorter() {
+        let curvature = DMatrix::from_row_slice(2, 2, &[1.0, -0.9, -0.9, 1.0]);
+        let lowest = DVector::from_row_slice(&[3.0, 2.0]);
+        let descent = &curvature * &lowest;
+        assert!(foretold(&curvature, &descent, &[0.0, 0.0], &[0.1, 1.9]) < 0.0);
+        let mut objective = Quadratic { curvature, lowest };
+        let mut point = vec![0.0, 0.0];
+        let effort = Effort {
+            iterations: 100,
+            settled: 1e-12,
+            attempts: ATTEMPTS,
+        };
+        let left = minimise(
+            &mut objective,
+            &mut point,
+            &[range(0.1), range(1.9)],
+            effort,
+        );
+        assert!(
+            left.is_some_and(|left| left < 1e-6),
+            "{left:?} at {point:?}"
+        );
+    }
 }
