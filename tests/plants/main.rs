@@ -12,6 +12,7 @@ mod physics_mutations;
 mod physics_simulate;
 mod physics_texts;
 mod plant_cli;
+mod plant_coast_down;
 mod plant_explain;
 mod plant_gravity;
 mod plant_held_out;

@@ -47,6 +47,13 @@ impl Fitted {
         self.candidate.without(&self.fit, parameters)
     }
 
+    /// The factor of a term whose size its shapes do not fix.
+    pub(in crate::explain::engine) fn strength(&self) -> f64 {
+        let first = self.candidate.plant.spec.parameters().len() - self.candidate.values.len();
+        let at = first + self.shapes.len();
+        self.fit.point.get(at).copied().unwrap_or(0.0)
+    }
+
     /// The gain without the [`FEW`] values that it owes most to.
     pub(in crate::explain::engine) fn gain_without_few(
         &self,

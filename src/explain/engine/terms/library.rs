@@ -11,7 +11,8 @@ pub(super) const TIMES: &[f64] = &[
 ];
 
 use Needs::{
-    Angle, Anything, BothSigns, Difference, OwnState, Positive, Radiation, Stretch, Time, Velocity,
+    Angle, Anything, BothSigns, Difference, OneWay, OwnState, Positive, Radiation, Stretch, Time,
+    Velocity,
 };
 use Port::{Equation, Input, Parameter, Sensor};
 
@@ -51,6 +52,8 @@ pub(crate) const TERMS: &[Term] = &[
         "tanh({z}/{w})",
         &[shape("w", Starts::Spread(&[0.02, 0.1]), true)],
     ),
+    // Where the motion never turns, the speed at which friction comes up does not show.
+    curve("one_way_friction", Equation, OneWay, "sign({z})", &[]),
     curve(
         "stribeck",
         Equation,

@@ -116,6 +116,8 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
     let low = |shape: f64| shape < 0.5 * (found.range.0 + found.range.1);
     let fastest = found.range.0.abs().max(found.range.1.abs());
     match (id, found.shapes.first()) {
+        // A force that is always the same, and drives.
+        ("coulomb_friction", None) if found.strength() > 0.0 => "load_step",
         ("hysteresis", Some(&slip))
             if may_be_velocity(spec, &variables) && slip < YIELDS * found.travel =>
         {
@@ -182,6 +184,7 @@ pub(crate) fn called(
     };
     let unit = |v: VariableId| spec.variable(v).unit_text.as_deref().unwrap_or("");
     let unit_of_place = unit(own);
+    let may_be_level = matches!(what, Kind::Other | Kind::Unknown);
     match (term.port, term.id) {
         (Port::Sensor, id) => id,
         (Port::Input, "input_square" | "input_cube") => "input_curve",
@@ -209,6 +212,7 @@ pub(crate) fn called(
             "quadratic_stiffness"
         }
         (Port::Equation, "friction") if what == Kind::Velocity => "coulomb_friction",
+        (Port::Equation, "one_way_friction") if *variables == [own] => "coulomb_friction",
         (Port::Equation, "stribeck" | "stribeck_bristles") => "stribeck_friction",
         (Port::Equation, "bristles") => "hysteresis",
         (Port::Equation, id @ ("extra_mode" | "backlash")) => id,
@@ -219,8 +223,8 @@ pub(crate) fn called(
             Kind::Other | Kind::Unknown if *variables == [own] => "overflow",
             _ => "law",
         },
-        (Port::Equation, "root_above") if *variables == [own] => "overflow",
-        (Port::Equation, "root") if *variables == [own] => "leak",
+        (Port::Equation, "root_above") if *variables == [own] && may_be_level => "overflow",
+        (Port::Equation, "root") if *variables == [own] && may_be_level => "leak",
         (Port::Equation, "sine") => "cogging",
         (Port::Equation, "gravity") => "gravity_torque",
         (Port::Equation, "periodic") => "periodic_disturbance",
@@ -296,11 +300,10 @@ pub(in crate::explain::engine) fn heats_itself(
 pub(crate) fn rank(spec: &ModelSpec, found: &Fitted) -> u8 {
     let variables: Vec<VariableId> = found.depends.iter().filter_map(|n| spec.find(n)).collect();
     let of_term = rank_of(spec, found.lead.term, found.lead.place, &variables);
-    match found.shapes.first() {
+    match (found.lead.term.id, found.shapes.first()) {
         // A load that is there from the beginning is a constant, which comes before it.
-        Some(&at) if found.lead.term.id == "load_step" && is_early(at, found.range) => {
-            of_term + PLACES * (CONSTANT + 1)
-        }
+        ("load_step", Some(&at)) if is_early(at, found.range) => of_term + PLACES * (CONSTANT + 1),
+        ("one_way_friction", _) if named(spec, found) == "load_step" => of_term + PLACES * CONSTANT,
         _ => of_term,
     }
 }
@@ -337,6 +340,8 @@ pub(in crate::explain::engine) fn rank_of(
             let from_outside =
                 term.needs == Needs::Time || variables.iter().any(|&v| unused(spec, v));
             let elsewhere = match spec.equations[at].unknown {
+                // What follows from a variable comes before what happens to a sensor at its own time.
+                _ if term.port == Port::Sensor && term.needs == Needs::Time => 1,
                 _ if variables.contains(&own) || term.port != Port::Equation => 0,
                 // A load, and an input that nothing else uses, act on what moves, before what drives it.
                 Unknown::Derivative(v) if from_outside && !is_velocity(spec, &[v]) => 2,

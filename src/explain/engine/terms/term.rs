@@ -32,6 +32,8 @@ pub(crate) enum Needs {
     Angle,
     /// A velocity of both signs.
     Velocity,
+    /// A velocity of one sign.
+    OneWay,
     /// The state whose derivative the equation determines.
     OwnState,
     /// No argument: a function of time alone.
