@@ -25,6 +25,10 @@ pub(super) fn holm(p_values: &[Option<f64>], level: f64) -> Vec<bool> {
     rejected
 }
 
+/// A share of the residual variance that predictions leave unused beyond this is no white noise, even where the uncertainty of the
+/// parameters allows it: a tenth of the variance is a twentieth of the residual's size.
+const ALLOWED_SHARE: f64 = 0.1;
+
 /// Share of the level at which what is only information gets a sentence.
 const INFORMATION: f64 = 0.1;
 
@@ -34,6 +38,16 @@ impl Validation {
         let limit = INFORMATION * self.level;
         let feedback = self.feedback.as_ref();
         feedback.is_some_and(|test| test.p_value < limit)
+    }
+
+    /// The test whose past predicts much of the residuals of a fresh recording without a rejection, because the uncertainty of the
+    /// parameters allows it: the tests have little power then.
+    pub fn allowed_by_uncertainty(&self) -> Option<&ResidualTest> {
+        let fresh = self.relation == Relation::Fresh && !self.rejected;
+        let tests = [self.past_inputs.as_ref(), self.whiteness.as_ref()];
+        (tests.into_iter().flatten())
+            .filter(|test| fresh && test.explained_share > ALLOWED_SHARE)
+            .max_by(|a, b| a.explained_share.total_cmp(&b.explained_share))
     }
 }
 
@@ -90,6 +104,13 @@ pub(super) fn decide(validation: &mut Validation, noise_model: bool) {
     if !validation.rejected {
         findings.push(if let Some(short) = &validation.too_short {
             short.sentence()
+        } else if let Some(test) = validation.allowed_by_uncertainty() {
+            format!(
+                "the past predicts {} of the residual variance{}, which the uncertainty of the parameters allows: these tests cannot \
+                 tell the model from a wrong one; judge it by its free run, and identify it from a longer or richer recording",
+                percent(test.explained_share),
+                most(test)
+            )
         } else if family.iter().all(Option::is_none) {
             "no test of the residuals applies: judge the model by its fit".to_owned()
         } else {

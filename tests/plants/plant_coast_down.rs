@@ -37,6 +37,8 @@ fn rolling_resistance_is_dry_friction() {
             "log.csv",
             "--simulation",
             "car.mo",
+            "--inputs",
+            "none",
             "--output",
             "e.json",
         ];
@@ -46,7 +48,9 @@ fn rolling_resistance_is_dry_friction() {
         let effect = &said["effects"][0];
         assert_eq!(effect["effect"], "coulomb_friction", "{summary}");
         assert_eq!(said["effects"].as_array().unwrap().len(), 1, "{summary}");
-        let force = effect["parameters"]["one_way_friction_c"]["value"].as_f64().unwrap();
+        let force = effect["parameters"]["one_way_friction_c"]["value"]
+            .as_f64()
+            .unwrap();
         assert!((force + 180.0).abs() < 6.0, "{summary}");
     }
 }

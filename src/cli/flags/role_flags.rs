@@ -104,6 +104,8 @@ impl RoleFlags {
                         of: &[IdentifiedChannel]|
          -> anyhow::Result<Option<Vec<String>>> {
             match asked {
+                // `none`, of a model that has none.
+                Some(names) if of.is_empty() && names == ["none"] => Ok(None),
                 Some(names) if names.len() != of.len() => {
                     let wanted: Vec<String> = of.iter().map(|c| c.channel.to_string()).collect();
                     anyhow::bail!(

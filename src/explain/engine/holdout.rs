@@ -15,6 +15,8 @@ pub(crate) const EXPLAINED: f64 = 0.5;
 /// A run that takes this part off the variance of a recording is a very good one (D. N. Moriasi et al., *Trans. ASABE* 50, 2007,
 /// Table 4: Nash-Sutcliffe efficiency above 0.75).
 const VERY_GOOD: f64 = 0.75;
+/// One that does not take more than this part off is unsatisfactory (the same).
+pub(crate) const SATISFACTORY: f64 = 0.5;
 /// Errors of this many standard deviations and more are those of a run that leaves the recording.
 const STAYS: f64 = 10.0;
 /// Effort of a fit from that to all of the recordings.

@@ -88,8 +88,8 @@ impl Found {
     }
 }
 
-/// What blocks left out say of free runs, where values that depend on each other make a criterion weak: a candidate is accepted
-/// that takes more than half of the mean square off them, and named where it takes as much off what any other function leaves.
+/// What blocks left out say of free runs, where values that depend on each other make a criterion weak: a candidate that the
+/// criterion does not speak against is accepted if it takes more than half of the mean square off them, and named where it takes as much off what any other function leaves.
 /// One that halves what the best leaves comes before it. What depends on time alone is not accepted so: its value in a block is a
 /// level that any slow error has.
 fn judge_by_blocks(
@@ -113,7 +113,7 @@ fn judge_by_blocks(
         of(&fitted[i]) != of(&fitted[j])
     };
     let explains = |errors: &HeldOut| errors.follows() && errors.removed(&without) >= EXPLAINED;
-    let provable = |i: usize| fitted[i].lead.term.needs != Needs::Time;
+    let provable = |i: usize| fitted[i].gain > 0.0 && fitted[i].lead.term.needs != Needs::Time;
     let mut chosen: Option<&(usize, HeldOut)> = None;
     for candidate @ (i, errors) in &judged {
         let better = match chosen {

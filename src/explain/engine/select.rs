@@ -8,7 +8,7 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::explain::engine::holdout::{
-    EXPLAINED, Estimator, HeldOut, all_free, as_given, free_run_error, held_out,
+    EXPLAINED, Estimator, HeldOut, SATISFACTORY, all_free, as_given, free_run_error, held_out,
 };
 use crate::explain::engine::long_recordings::part;
 use crate::explain::engine::named_alone::named_alone;
@@ -349,13 +349,16 @@ fn rivals(found: &Found, search: usize, recordings: &[PlantRecording], hold: Hol
 }
 
 /// Drops what least squares refutes: values that leave more than twice its mean square over all data, and more than the noise
-/// allows. Blocks left out of a short recording hold too little to say otherwise.
+/// allows, or a free run that is unsatisfactory. Blocks left out of a short recording hold too little to say otherwise.
 fn drop_refuted(rivals: &mut Vec<Rival>, first: usize) {
     let of_free_run = |r: &&Rival| r.estimator == Estimator::FreeRun;
     let Some(least) = rivals[first..].iter().find(of_free_run).map(|r| r.whole) else {
         return;
     };
-    let refuted = |r: &Rival| r.misspecified && 1.0 - (least / r.whole).powi(2) >= EXPLAINED;
+    let unsatisfactory = |r: &Rival| 1.0 - r.whole.powi(2) <= SATISFACTORY;
+    let refuted = |r: &Rival| {
+        (r.misspecified || unsatisfactory(r)) && 1.0 - (least / r.whole).powi(2) >= EXPLAINED
+    };
     let kept = rivals.split_off(first);
     rivals.extend(kept.into_iter().filter(|r| !refuted(r)));
 }
@@ -452,5 +455,8 @@ mod tests {
         assert_eq!(kept(0.28, true), 4);
         assert_eq!(kept(0.29, true), 3);
         assert_eq!(kept(0.29, false), 4);
+        // A free run that explains less than half of the variance needs no test.
+        assert_eq!(kept(0.70, false), 4);
+        assert_eq!(kept(0.71, false), 3);
     }
 }

@@ -18,12 +18,13 @@ use super::terms::names::{SPECIFIC, named, rank_of};
 use super::thresholds::{
     AT_A_PLACE, BETTER, COMPARED, FINISHED, FITTED, FOLLOWS, FORETOLD, GLANCE, GLANCED,
     GLANCED_STEPS, IMITATED, LEFT, MOST, MOST_STEPS, NEEDED, OF_A_KIND, THOROUGH, chance,
+    times_more,
 };
 use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{ModelSpec, Plant};
 
-fn promising(screen: &Screen, spec: &ModelSpec) -> Vec<Lead> {
+fn promising(screen: &Screen, spec: &ModelSpec, more: usize) -> Vec<Lead> {
     let mut kept: Vec<Lead> = Vec::new();
     for lead in &screen.leads {
         let kind = |l: &&Lead| l.term == lead.term;
@@ -32,12 +33,12 @@ fn promising(screen: &Screen, spec: &ModelSpec) -> Vec<Lead> {
         let place = |l: &&Lead| l.place == lead.place;
         if kept.iter().any(same)
             || kept.iter().filter(kind).count() >= OF_A_KIND
-            || kept.iter().filter(place).count() >= AT_A_PLACE
+            || kept.iter().filter(place).count() >= more * AT_A_PLACE
         {
             continue;
         }
         kept.push(lead.clone());
-        if kept.len() == GLANCED {
+        if kept.len() == more * GLANCED {
             break;
         }
     }
@@ -234,11 +235,14 @@ pub(super) fn step(stage: &Stage) -> Step {
             drop_alike(screen, &plant.spec, (first, named(given, first)));
         }
     }
+    let more = times_more(study.count());
+    // What the plant's parameters have done to make up for a term may lead far from what they are beside it.
+    let text = (accepted == 0 && more > 1).then(|| study.nominal());
     let mut glanced: Vec<(f64, Lead, usize, Candidate, Fit)> = tried
         .iter()
         .enumerate()
         .flat_map(|(i, (screen, from))| {
-            promising(screen, &plant.spec)
+            promising(screen, &plant.spec, more)
                 .into_iter()
                 .map(move |lead| (i, screen, from, lead))
         })
@@ -254,10 +258,21 @@ pub(super) fn step(stage: &Stage) -> Step {
                 false => made.from(from, parameters),
             };
             // What a memory does within a sample, such as a contact, frozen slopes do not see.
-            let fitted = match made.new_states {
-                0 => inner.glance(&start, GLANCE)?,
-                _ => inner.refit(&start, 0, GLANCE)?,
+            let glance = |start: &Fit| match made.new_states {
+                0 => inner.glance(start, GLANCE),
+                _ => inner.refit(start, 0, GLANCE),
             };
+            let of_text = text.as_ref().and_then(|text| {
+                let mut point = from.point.clone();
+                point[..text.len()].copy_from_slice(text);
+                let text = Fit {
+                    point,
+                    ..from.clone()
+                };
+                glance(&made.from(&text, parameters))
+            });
+            let fitted = (glance(&start).into_iter().chain(of_text))
+                .min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
             let again = |fit: &Fit| inner.refit(fit, 0, GLANCE);
             let fitted = released(&inner, lead.term, parameters, fitted, &again);
             Some((from.deviance - fitted.deviance, lead, i, made, fitted))
@@ -276,8 +291,8 @@ pub(super) fn step(stage: &Stage) -> Step {
             let specific = rank_of(&plant.spec, lead.term, lead.place, variables) < SPECIFIC;
             *gain > (1.0 - TIE.1) * most && specific
         };
-        let best = list.iter().take(FITTED);
-        let others = list.iter().skip(FITTED).copied().filter(close);
+        let best = list.iter().take(more * FITTED);
+        let others = list.iter().skip(more * FITTED).copied().filter(close);
         chosen.extend(
             best.copied()
                 .chain(others)
@@ -341,6 +356,13 @@ pub(super) fn step(stage: &Stage) -> Step {
     fitted.retain(|f| scope.allows(named(&plant.spec, f)));
     let mut origins = vec![fit];
     origins.extend(tried.iter().skip(1).map(|(_, white)| white));
+    // From the values of the text too: those of the fit may have made up for what is asked.
+    let white = (origins.iter().copied()).find(|o| o.form == Form::FreeRun);
+    let of_text = white.filter(|_| accepted == 0).map(|white| Fit {
+        point: study.nominal(),
+        ..white.clone()
+    });
+    origins.extend(&of_text);
     let ground = Ground {
         plant,
         study,

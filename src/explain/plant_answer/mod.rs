@@ -2,13 +2,12 @@
 
 mod formula_in_numbers;
 mod hypotheses;
-mod joint_test;
+mod judgement;
 mod location;
 mod plant_effects;
 mod plant_summary;
 mod question;
 mod simulate_explained;
-mod stated_probability;
 mod where_to_look;
 mod within_bounds;
 
@@ -17,9 +16,10 @@ pub use simulate_explained::{AugmentedPlantError, Original};
 
 use nalgebra::DMatrix;
 
-use self::joint_test::joint_test;
+use self::judgement::free_run::is_astray;
+use self::judgement::joint_test::joint_test;
+use self::judgement::stated_probability::probability;
 use self::plant_summary::{Differs, Told, as_good};
-use self::stated_probability::probability;
 use self::where_to_look::experiment;
 use self::within_bounds::within_bounds;
 
@@ -202,15 +202,6 @@ impl Answer<'_> {
             && follows
             && self.effects().all(|fitted| self.is_significant(fitted))
             && (adequate || explains && !curves);
-        let verdict = if self.found.accepted > 0 && sure {
-            Verdict::Named
-        } else if self.found.accepted > 0 || p_value < CHANCE {
-            Verdict::Unexplained
-        } else if parameters.is_empty() {
-            Verdict::Consistent
-        } else {
-            Verdict::Parameters
-        };
         let recorded: Series = self
             .recordings
             .iter()
@@ -270,12 +261,29 @@ impl Answer<'_> {
             .collect();
         let percent = |o: &OutputFit| o.train.augmented.fit_percent;
         each.sort_by(|a, b| percent(a).total_cmp(&percent(b)));
-        let alternatives = self.alternatives();
-        let probability = probability(verdict, effects.len(), p_value);
-        let (differs, together) = match verdict {
-            Verdict::Consistent => self.differs(),
-            _ => (Differs::Parameters, None),
+        let strays = self.strays(&each);
+        let baseline = (&self.base, &self.found.baseline);
+        let astray =
+            effects.is_empty() && is_astray(&each, strays, self.plant, baseline, self.recordings);
+        let (differs, together) = match effects.is_empty() && parameters.is_empty() {
+            true => self.differs(),
+            false => (Differs::Parameters, None),
         };
+        let alternatives = self.alternatives();
+        // What the criterion is sure of, and blocks left out refuse, may be beyond what they span.
+        let refused = (alternatives.iter())
+            .filter(|a| effects.is_empty() && a.criterion_gain >= SURE)
+            .max_by(|a, b| a.criterion_gain.total_cmp(&b.criterion_gain));
+        let verdict = if self.found.accepted > 0 && sure {
+            Verdict::Named
+        } else if self.found.accepted > 0 || p_value < CHANCE || astray || refused.is_some() {
+            Verdict::Unexplained
+        } else if matches!(differs, Differs::Parameters | Differs::Together(_)) {
+            Verdict::Parameters
+        } else {
+            Verdict::Consistent
+        };
+        let probability = probability(verdict, effects.len(), p_value);
         let mut summary = self.summary(&Told {
             verdict,
             probability,
@@ -285,7 +293,9 @@ impl Answer<'_> {
             alternatives: &alternatives,
             outputs: &each,
             p_value,
-            strays: self.strays(&each),
+            strays,
+            astray,
+            refused,
         });
         // What is not sure predicts a fresh recording only where it has explained blocks left out, in every output.
         let relied_on = verdict != Verdict::Unexplained || effects.is_empty() || relied_on;
@@ -301,9 +311,15 @@ impl Answer<'_> {
                     .to_owned(),
             );
         }
-        let closest = effects.first().filter(|_| verdict == Verdict::Unexplained);
-        summary.extend(closest.and_then(|e| as_good(e, &alternatives)));
-        let separating_experiment = closest.and_then(|e| experiment(e, &alternatives));
+        let unexplained = verdict == Verdict::Unexplained;
+        let first = effects
+            .first()
+            .filter(|_| unexplained || effects.len() == 1);
+        let equals = first.and_then(|e| as_good(e, &alternatives));
+        let unsure = unexplained || equals.is_some();
+        summary.extend(equals);
+        let separating_experiment =
+            (first.filter(|_| unsure)).and_then(|e| experiment(e, &alternatives));
         if let Some(experiment) = &separating_experiment {
             summary.push(format!("To settle it: {experiment}."));
         }

@@ -1,6 +1,7 @@
 //! The answer in sentences.
 
 use super::Answer;
+use super::judgement::free_run::STRAYS;
 use super::where_to_look::places;
 use super::within_bounds::at_bounds;
 use crate::explain::document::sentences::{number, p_value, quantity};
@@ -14,9 +15,6 @@ use crate::physics::estimate::PlantRecording;
 
 /// Rivals that the summary lists.
 const MOST_RIVALS: usize = 4;
-/// A free run that leaves more of an output than so many one-step errors strays: with this noise what is slow explains most of it.
-const STRAYS: f64 = 2.0;
-
 /// How the estimates differ from the text, where nothing is missing in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Differs {
@@ -44,6 +42,10 @@ pub(super) struct Told<'a> {
     pub(super) p_value: f64,
     /// Error of the free run over that of one-step predictions.
     pub(super) strays: f64,
+    /// Without an effect, the free run is too poor for nothing to be missing.
+    pub(super) astray: bool,
+    /// What the criterion is sure of, but blocks left out refuse.
+    pub(super) refused: Option<&'a Alternative>,
 }
 
 impl Answer<'_> {
@@ -69,6 +71,21 @@ impl Answer<'_> {
                 lines.push(
                     "Something is missing in the equations, and no term of the library describes it surely.".to_owned(),
                 );
+                if told.astray {
+                    lines.push(format!(
+                        "The free run leaves {:.1} times the error of one-step predictions, and more than half of the variance: no \
+                         noise of a sensor is so slow.",
+                        told.strays
+                    ));
+                }
+                lines.extend(told.refused.map(|a| {
+                    format!(
+                        "The effect `{}` improves the fit (gain {:.1}, needed {NEEDED:.1}), but not simulations of held-out blocks: {}.",
+                        a.effect,
+                        a.criterion_gain,
+                        a.why_not.split(": its criterion").next().unwrap_or_default()
+                    )
+                }));
                 lines.extend(self.found.map.as_ref().and_then(places));
                 for (effect, fitted) in told.effects.iter().zip(self.effects()) {
                     lines.push(closest(effect));
@@ -371,6 +388,8 @@ pub(super) mod tests {
         outputs: &[],
         p_value: 0.3,
         strays: 1.1,
+        astray: false,
+        refused: None,
     };
 
     #[test]
@@ -414,6 +433,8 @@ pub(super) mod tests {
         let told = Told {
             p_value: 0.0027,
             strays: 6.3,
+            astray: false,
+            refused: None,
             ..NOTHING
         };
         let said = nothing_missing(&told, false);
@@ -426,6 +447,8 @@ pub(super) mod tests {
         assert!(said[1].contains("cannot be told apart"), "{said:?}");
         let told = Told {
             strays: 6.3,
+            astray: false,
+            refused: None,
             ..NOTHING
         };
         assert!(!nothing_missing(&told, false)[0].contains("white"));

@@ -160,8 +160,9 @@ pub(in crate::explain::engine) fn order(spec: &ModelSpec, fitted: &mut [Fitted])
             false => f.gain,
         };
         fitted[..equals].sort_by(|a, b| {
-            let by_rank = rank(spec, a).cmp(&rank(spec, b));
-            by_rank.then(supported(b).total_cmp(&supported(a)))
+            // Of equals the one without a memory: more states follow more.
+            let key = |f: &Fitted| (rank(spec, f), f.candidate.new_states);
+            (key(a).cmp(&key(b))).then(supported(b).total_cmp(&supported(a)))
         });
         prefer_special_case(spec, fitted);
         prefer_asked(fitted);

@@ -161,6 +161,7 @@ impl Argument {
             Needs::Stretch => self.position && self.serves(Needs::Difference),
             Needs::Angle => self.angle,
             Needs::Velocity => both && self.velocity,
+            Needs::Directed => both || self.serves(Needs::OneWay),
             Needs::OneWay => self.velocity && self.quantile(0.0) * self.quantile(1.0) > 0.0,
             Needs::OwnState => self.form == ArgumentForm::Variable && !self.held,
             Needs::Time => false,

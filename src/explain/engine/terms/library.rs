@@ -11,8 +11,8 @@ pub(super) const TIMES: &[f64] = &[
 ];
 
 use Needs::{
-    Angle, Anything, BothSigns, Difference, OneWay, OwnState, Positive, Radiation, Stretch, Time,
-    Velocity,
+    Angle, Anything, BothSigns, Difference, Directed, OneWay, OwnState, Positive, Radiation,
+    Stretch, Time, Velocity,
 };
 use Port::{Equation, Input, Parameter, Sensor};
 
@@ -42,9 +42,17 @@ pub(super) const fn hysteresis(memories: &'static [Memory], shapes: &'static [Sh
 pub(crate) const TERMS: &[Term] = &[
     curve("linear", Equation, Anything, "{z}", &[]),
     curve("square", Equation, Anything, "{z}^2", &[]),
-    curve("signed_square", Equation, BothSigns, "{z}*abs({z})", &[]),
+    curve("signed_square", Equation, Directed, "{z}*abs({z})", &[]),
     curve("cube", Equation, Anything, "{z}^3", &[]),
     curve("root", Equation, Positive, "sqrt(max({z}, 0))", &[]),
+    // Michaelis and Menten's, Monod's and Langmuir's.
+    curve(
+        "saturation",
+        Equation,
+        Positive,
+        "{z}/({z} + {K})",
+        &[shape("K", Starts::Quantiles(&[0.2, 0.6]), true)],
+    ),
     curve(
         "friction",
         Equation,

@@ -28,7 +28,7 @@ fn defines(spec: &ModelSpec, v: VariableId) -> bool {
 }
 
 fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
-    let unit = |v: VariableId| spec.variable(v).unit_text.as_deref().unwrap_or("");
+    let unit = |v: VariableId| unit_of(spec, v);
     let all =
         |of: &dyn Fn(VariableId) -> bool| !variables.is_empty() && variables.iter().all(|&v| of(v));
     let moves = spec
@@ -94,7 +94,7 @@ pub(in crate::explain::engine) fn is_velocity(spec: &ModelSpec, variables: &[Var
 fn flows(unit: &str) -> bool {
     matches!(
         unit,
-        "m" | "m3" | "kg" | "1" | "%" | "A.h" | "C" | "l" | "L" | "Pa" | "bar"
+        "m" | "m3" | "kg" | "1" | "%" | "A.h" | "C" | "V" | "l" | "L" | "Pa" | "bar"
     )
 }
 
@@ -118,6 +118,16 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
     match (id, found.shapes.first()) {
         // A force that is always the same, and drives.
         ("coulomb_friction", None) if found.strength() > 0.0 => "load_step",
+        _ if feeds(spec, id, found) => "law",
+        // With nothing between its sides it is a loss in proportion.
+        ("overflow", Some(&edge))
+            if found.lead.term.id == "both_sides" && edge < NARROW * fastest =>
+        {
+            match flows(unit_of(spec, found.lead.place.variable(spec))) {
+                true => "leak",
+                false => "law",
+            }
+        }
         ("hysteresis", Some(&slip))
             if may_be_velocity(spec, &variables) && slip < YIELDS * found.travel =>
         {
@@ -134,6 +144,44 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
         }
         _ => id,
     }
+}
+
+/// A middle this narrow, as a part of the largest size, is none.
+const NARROW: f64 = 0.05;
+
+/// Effects that take from the state in whose equation they stand: friction, drag, losses.
+const LOSSES: [&str; 9] = [
+    "coulomb_friction",
+    "stribeck_friction",
+    "viscous_friction",
+    "quadratic_drag",
+    "cubic_drag",
+    "leak",
+    "overflow",
+    "radiation",
+    "natural_convection",
+];
+
+/// Whether a term has the name of a loss, or of a stop, but the sign of a source: a function of its own state that drives it on,
+/// or of a position that draws to where it begins.
+fn feeds(spec: &ModelSpec, id: &str, found: &Fitted) -> bool {
+    let Place::Equation(at) = found.lead.place else {
+        return false;
+    };
+    let own = found.lead.place.variable(spec);
+    let first = found.depends.first().and_then(|name| spec.find(name));
+    let own_rate = spec.equations[at].unknown == Unknown::Derivative(own);
+    // Below an edge the argument counts from it, and is negative.
+    let source = match found.lead.term.id {
+        "below" if id == "overflow" => found.strength() < 0.0,
+        _ => found.strength() > 0.0,
+    };
+    let takes = LOSSES.contains(&id) && first == Some(own) || id == "end_stop";
+    found.lead.term.free_strength && own_rate && takes && source
+}
+
+fn unit_of(spec: &ModelSpec, v: VariableId) -> &str {
+    spec.variable(v).unit_text.as_deref().unwrap_or("")
 }
 
 /// Effects that are forms of one: what a second of them finds is what the first left.
@@ -182,7 +230,7 @@ pub(crate) fn called(
         Kind::Unknown if slows(term) && *variables == [own] => Kind::Velocity,
         known => known,
     };
-    let unit = |v: VariableId| spec.variable(v).unit_text.as_deref().unwrap_or("");
+    let unit = |v: VariableId| unit_of(spec, v);
     let unit_of_place = unit(own);
     let may_be_level = matches!(what, Kind::Other | Kind::Unknown);
     match (term.port, term.id) {

@@ -34,6 +34,8 @@ pub(crate) enum Needs {
     Velocity,
     /// A velocity of one sign.
     OneWay,
+    /// What has a direction: both signs occur, or it is a velocity of one sign.
+    Directed,
     /// The state whose derivative the equation determines.
     OwnState,
     /// No argument: a function of time alone.

@@ -69,6 +69,9 @@ pub(crate) fn headline(of: &Headline) -> String {
 /// What an acceptance rests on.
 pub(crate) fn in_words(tests: &Validation) -> &'static str {
     match (&tests.whiteness, &tests.linearity) {
+        _ if tests.allowed_by_uncertainty().is_some() => {
+            "its uncertain parameters allow the structure in the residuals"
+        }
         (_, Some(_)) => "the residuals are white and linear in the past",
         (Some(_), None) => "the residuals are white; linearity was not tested",
         (None, None) => "nothing speaks against it; linearity was not tested",

@@ -39,10 +39,14 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
     effect(
         "coulomb_friction",
         "dry friction",
-        "m*der(v) = ... + c*tanh(v/w)",
+        "m*der(v) = ... + c*tanh(v/w), or c*sign(v) where the motion never turns",
         ANY_EQUATION,
         A_VELOCITY,
         &[
+            like(
+                "load_step",
+                "Move in both directions: friction turns with the motion, a load does not.",
+            ),
             like(
                 "stribeck_friction",
                 "Drive slowly and at several constant speeds: the force of dry friction is the same at all of them.",

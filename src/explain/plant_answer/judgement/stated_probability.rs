@@ -7,7 +7,11 @@ use crate::explain::explanation::Verdict;
 /// structure beside them. Counted on 60 recordings of 23 classes of plants (`benches/physics_cases.py --seed 5` and `--seed 6`, the
 /// first 30 of each; the check on others stands in `docs/accuracy.md`), with one right and one wrong answer added to each group.
 /// Without a name it is the probability that something is missing, or that nothing is.
-pub(super) fn probability(verdict: Verdict, effects: usize, p_value: f64) -> f64 {
+pub(in crate::explain::plant_answer) fn probability(
+    verdict: Verdict,
+    effects: usize,
+    p_value: f64,
+) -> f64 {
     let (right, all) = match verdict {
         Verdict::Named | Verdict::Family if effects > 1 => (2, 6),
         Verdict::Named | Verdict::Family if p_value < CHANCE => (5, 8),

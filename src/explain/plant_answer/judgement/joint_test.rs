@@ -18,7 +18,10 @@ impl JointTest {
 }
 
 /// Wald's test of the whole shift from the text with its covariance. Numbers without a variance are left out.
-pub(super) fn joint_test(shift: &[f64], covariance: &DMatrix<f64>) -> Option<JointTest> {
+pub(in crate::explain::plant_answer) fn joint_test(
+    shift: &[f64],
+    covariance: &DMatrix<f64>,
+) -> Option<JointTest> {
     let determined: Vec<usize> = (0..shift.len())
         .filter(|&i| covariance[(i, i)].is_finite() && covariance[(i, i)] > 0.0)
         .collect();
