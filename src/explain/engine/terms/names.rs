@@ -114,6 +114,7 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
     let id = called(spec, found.lead.term, found.lead.place, &variables);
     // Values of the fit decide between names of one term.
     let low = |shape: f64| shape < 0.5 * (found.range.0 + found.range.1);
+    let lowest = found.range.0 + NARROW * (found.range.1 - found.range.0);
     let fastest = found.range.0.abs().max(found.range.1.abs());
     match (id, found.shapes.first()) {
         // A force that is always the same, and drives.
@@ -139,14 +140,12 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
         }
         ("overflow", Some(&edge)) if found.lead.term.id == "root_above" && low(edge) => "leak",
         // A level that is exceeded throughout is no level.
-        ("overflow", Some(&edge)) if found.lead.term.id == "above" && edge <= found.range.0 => {
-            "leak"
-        }
+        ("overflow", Some(&edge)) if found.lead.term.id == "above" && edge <= lowest => "leak",
         _ => id,
     }
 }
 
-/// A middle this narrow, as a part of the largest size, is none.
+/// A middle this narrow, as a part of the largest size, is none, and so is a threshold this low in the range.
 const NARROW: f64 = 0.05;
 
 /// Effects that take from the state in whose equation they stand: friction, drag, losses.
@@ -301,7 +300,8 @@ pub(crate) fn called(
                 let (heated, others): (Vec<VariableId>, Vec<_>) = variables
                     .iter()
                     .partition(|&&v| kind(spec, &[v]) == Kind::Temperature);
-                let inside = |v: &VariableId| place.uses(spec, *v);
+                // It may be a resistance only of what heats: a reaction that a temperature speeds up is none.
+                let inside = |v: &VariableId| place.uses(spec, *v) && may_heat(unit(*v));
                 if !heated.is_empty() && !others.is_empty() && others.iter().all(inside) {
                     "temperature_dependent_resistance"
                 } else {
@@ -388,8 +388,14 @@ pub(in crate::explain::engine) fn rank_of(
             let from_outside =
                 term.needs == Needs::Time || variables.iter().any(|&v| unused(spec, v));
             let elsewhere = match spec.equations[at].unknown {
-                // What follows from a variable comes before what happens to a sensor at its own time.
-                _ if term.port == Port::Sensor && term.needs == Needs::Time => 1,
+                // What follows from a variable comes before what happens to a sensor at its own time; and where nothing drives the
+                // plant a sensor lags only by where it was at the start, which a second store does too.
+                _ if term.port == Port::Sensor
+                    && (term.needs == Needs::Time
+                        || !term.memories.is_empty() && spec.inputs().is_empty()) =>
+                {
+                    1
+                }
                 _ if variables.contains(&own) || term.port != Port::Equation => 0,
                 // A load, and an input that nothing else uses, act on what moves, before what drives it.
                 Unknown::Derivative(v) if from_outside && !is_velocity(spec, &[v]) => 2,
