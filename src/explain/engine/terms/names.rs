@@ -117,6 +117,15 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
     let lowest = found.range.0 + NARROW * (found.range.1 - found.range.0);
     let fastest = found.range.0.abs().max(found.range.1.abs());
     match (id, found.shapes.first()) {
+        // A load from the beginning on is a constant: an outflow, where it is no force.
+        ("load_step", Some(&at))
+            if found.lead.term.id == "load_step"
+                && is_early(at, found.range)
+                && flows(unit_of(spec, found.lead.place.variable(spec)))
+                && found.strength() < 0.0 =>
+        {
+            "leak"
+        }
         // A force that is always the same, and drives.
         ("coulomb_friction", None) if found.strength() > 0.0 => "load_step",
         _ if feeds(spec, id, found) => "law",
@@ -350,7 +359,10 @@ pub(crate) fn rank(spec: &ModelSpec, found: &Fitted) -> u8 {
     let of_term = rank_of(spec, found.lead.term, found.lead.place, &variables);
     match (found.lead.term.id, found.shapes.first()) {
         // A load that is there from the beginning is a constant, which comes before it.
-        ("load_step", Some(&at)) if is_early(at, found.range) => of_term + PLACES * (CONSTANT + 1),
+        ("load_step", Some(&at)) if is_early(at, found.range) => match named(spec, found) {
+            "load_step" => of_term + PLACES * (CONSTANT + 1),
+            _ => of_term,
+        },
         ("one_way_friction", _) if named(spec, found) == "load_step" => of_term + PLACES * CONSTANT,
         _ => of_term,
     }
@@ -388,11 +400,12 @@ pub(in crate::explain::engine) fn rank_of(
             let from_outside =
                 term.needs == Needs::Time || variables.iter().any(|&v| unused(spec, v));
             let elsewhere = match spec.equations[at].unknown {
-                // What follows from a variable comes before what happens to a sensor at its own time; and where nothing drives the
-                // plant a sensor lags only by where it was at the start, which a second store does too.
+                // What happens to a sensor at its own time comes last; and where nothing drives the plant a sensor lags only by where
+                // it was at the start, which a second store does too.
+                _ if term.port == Port::Sensor && term.needs == Needs::Time => 3,
                 _ if term.port == Port::Sensor
-                    && (term.needs == Needs::Time
-                        || !term.memories.is_empty() && spec.inputs().is_empty()) =>
+                    && !term.memories.is_empty()
+                    && spec.inputs().is_empty() =>
                 {
                     1
                 }
