@@ -311,13 +311,13 @@ mod tests {
             start_time: 0.0,
         }];
         let mut arguments = arguments(&spec);
-        // Of both signs, and positive.
-        for (i, argument) in arguments.iter_mut().enumerate() {
-            let lift = [1.5, 0.0][i % 2];
-            argument.set(vec![(0..200).map(|k| wave(k) + lift).collect()]);
-        }
         let mut made = BTreeSet::new();
-        for term in TERMS {
+        // Every argument of both signs, and positive.
+        for (term, lifts) in (TERMS.iter()).flat_map(|t| [(t, [1.5, 0.0]), (t, [0.0, 1.5])]) {
+            for (i, argument) in arguments.iter_mut().enumerate() {
+                let lift = lifts[i % 2];
+                argument.set(vec![(0..200).map(|k| wave(k) + lift).collect()]);
+            }
             let mut at: Vec<Place> = match term.port {
                 Port::Sensor => sensors(&spec).into_iter().map(Place::Equation).collect(),
                 _ => places(&spec, &spec),
