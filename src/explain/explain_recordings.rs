@@ -4,8 +4,7 @@ use super::columns;
 use super::compare_explanations::{agree, doubt, is_doubtful, stands_in};
 use super::document::explain_error::ExplainError;
 use super::effects::{self, Definition};
-use super::engine::select::EQUAL;
-use super::explanation::{Explanation, FitSteps, FitTable, Verdict};
+use super::explanation::{Explanation, Verdict};
 use super::linear::answer::linear_answer::Answer;
 use super::linear::check::Checked;
 use super::linear::data::Data;
@@ -223,30 +222,14 @@ fn said(
     seed: u64,
 ) -> Explanation {
     finding.add(checked.troubles.clone());
-    let say = |finding: &Finding| {
-        let answer = Answer {
-            recordings: &checked.recordings,
-            known,
-            finding,
-            mask: mask.clone(),
-            seed,
-        };
-        answer.say()
-    };
-    let explanation = say(&finding);
-    let names = matches!(finding.verdict, Verdict::Named | Verdict::Family)
-        && !finding.model.structure.new_effects().is_empty();
-    if names && is_unlikely(explanation.probability, &explanation.fit) {
-        finding.verdict = Verdict::Unexplained;
-        return say(&finding);
+    Answer {
+        recordings: &checked.recordings,
+        known,
+        finding: &finding,
+        mask,
+        seed,
     }
-    explanation
-}
-
-/// Whether a name is more likely wrong than right, or what it stands for follows blocks left out worse than parameters alone.
-fn is_unlikely(probability: f64, fit: &FitTable) -> bool {
-    let worse = |h: &FitSteps| h.augmented.rmse > (1.0 + EQUAL) * h.parameters_only.rmse;
-    probability < 0.5 || fit.heldout.as_ref().is_some_and(worse)
+    .say()
 }
 
 /// Whether the finding is an averaged equation of what is no drive, but a mass on a spring.
@@ -294,38 +277,5 @@ fn tells_more(
         // What a half does not determine has nothing to say of the other.
         (free, None) => free.is_some(),
         (None, Some(_)) => false,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::explain::explanation::FitFigure;
-
-    #[test]
-    fn a_name_must_be_likelier_than_not_and_follow_blocks_left_out() {
-        let figure = |rmse: f64| FitFigure {
-            rmse,
-            fit_percent: 100.0 * (1.0 - rmse),
-        };
-        let steps = |without: f64, with: f64| FitSteps {
-            simulation: figure(0.5),
-            parameters_only: figure(without),
-            augmented: figure(with),
-            noise_floor: figure(0.1),
-            improvement_95: None,
-        };
-        let table = |heldout: Option<FitSteps>| FitTable {
-            output: "y".to_owned(),
-            train: steps(0.3, 0.2),
-            heldout,
-            heldout_blocks: vec![],
-            outputs: vec![],
-        };
-        assert!(!is_unlikely(0.6, &table(None)));
-        assert!(is_unlikely(0.4, &table(None)));
-        assert!(!is_unlikely(0.6, &table(Some(steps(0.3, 0.2)))));
-        assert!(!is_unlikely(0.6, &table(Some(steps(0.2, 0.203)))));
-        assert!(is_unlikely(0.6, &table(Some(steps(0.2, 0.205)))));
     }
 }

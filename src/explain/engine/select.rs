@@ -21,7 +21,7 @@ use crate::physics::{Hold, Plant};
 
 /// Free runs whose errors differ by less than this part are equally good (the tolerance of the project's score
 /// on real recordings).
-pub(crate) const EQUAL: f64 = 0.02;
+pub(super) const EQUAL: f64 = 0.02;
 /// Level of the test that asks whether maximum likelihood and least squares differ by more than chance allows.
 const MISSPECIFIED: f64 = 0.05;
 /// Probability by chance below which the strongest score test says that something is left.
