@@ -311,12 +311,9 @@ impl Answer<'_> {
                     .to_owned(),
             );
         }
-        let unexplained = verdict == Verdict::Unexplained;
-        let first = effects
-            .first()
-            .filter(|_| unexplained || effects.len() == 1);
+        let first = effects.first();
         let equals = first.and_then(|e| as_good(e, &alternatives));
-        let unsure = unexplained || equals.is_some();
+        let unsure = verdict == Verdict::Unexplained || equals.is_some();
         summary.extend(equals);
         let separating_experiment =
             (first.filter(|_| unsure)).and_then(|e| experiment(e, &alternatives));
