@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::{Answer, figure, within_bounds};
+use super::free_runs::figure;
+use super::{Answer, within_bounds};
 use crate::explain::document::sentences::{number, quantity};
 use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
 use crate::explain::engine::hypothesis::{Hypothesis, Trial};

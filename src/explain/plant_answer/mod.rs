@@ -1,6 +1,7 @@
 //! The answer where the simulation is a plant in equations.
 
 mod formula_in_numbers;
+mod free_runs;
 mod hypotheses;
 mod judgement;
 mod location;
@@ -23,10 +24,9 @@ use self::plant_summary::{Differs, Told, as_good};
 use self::where_to_look::experiment;
 use self::within_bounds::within_bounds;
 
-use super::document::plots::{extremes, spectrum, spectrum_picture};
 use super::engine::fitting::fitted::Fitted;
 use super::engine::fitting::initial_states::with_free_states;
-use super::engine::holdout::{EXPLAINED, HeldOut, blocks};
+use super::engine::holdout::{EXPLAINED, blocks};
 use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
 use super::engine::scope::Scope;
 use super::engine::search::Found;
@@ -34,21 +34,18 @@ use super::engine::select::{CHANCE, select};
 use super::engine::terms::term::Port;
 use super::engine::thresholds::{LEFT, SURE, chance};
 use super::explanation::{
-    AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitFigure, FitSteps,
-    FitTable, JointTest, NoiseFound, OutputFit, ParameterChange, Remaining, SignalTraces, Verdict,
+    AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitTable, JointTest,
+    OutputFit, ParameterChange, Remaining, Verdict,
 };
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
-use crate::noise::Series;
-use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
+use crate::physics::estimate::{EstimateOptions, PlantRecording, Study};
 use crate::physics::{Hold, ModelSpec, Plant, Span, units_in_words};
 
 /// A parameter is said to differ from the text where it does by so many standard deviations.
 const DIFFERENT: f64 = 3.3;
 /// Level at which the parameters of an effect differ from 0.
 const SIGNIFICANT: f64 = 0.05;
-/// Points of a picture.
-const TRACE_POINTS: usize = 1500;
 
 /// Says what a plant in equations leaves out of recordings.
 ///
@@ -127,30 +124,6 @@ fn distinct(all: &[Hypothesis]) -> Result<Vec<Hypothesis>, HypothesisError> {
     Ok(all.to_vec())
 }
 
-/// The mean of the values that are there, at every sample.
-fn level(recorded: &[f64]) -> Vec<f64> {
-    let known = recorded.iter().filter(|y| y.is_finite());
-    let (sum, count) = known.fold((0.0, 0), |(sum, count), y| (sum + y, count + 1));
-    vec![sum / f64::from(count.max(1)); recorded.len()]
-}
-
-fn figure(recorded: &[f64], simulated: &[f64]) -> FitFigure {
-    let pairs: Vec<(f64, f64)> = recorded
-        .iter()
-        .copied()
-        .zip(simulated.iter().copied())
-        .filter(|(y, s)| y.is_finite() && s.is_finite())
-        .collect();
-    let n = pairs.len().max(1) as f64;
-    let mean = pairs.iter().map(|p| p.0).sum::<f64>() / n;
-    let error = pairs.iter().map(|(y, s)| (y - s).powi(2)).sum::<f64>();
-    let spread = pairs.iter().map(|(y, _)| (y - mean).powi(2)).sum::<f64>();
-    FitFigure {
-        rmse: (error / n).sqrt(),
-        fit_percent: 100.0 * (1.0 - (error / spread.max(f64::MIN_POSITIVE)).sqrt()),
-    }
-}
-
 impl Answer<'_> {
     fn effects(&self) -> impl Iterator<Item = &Fitted> {
         let steps = self.found.steps.iter().take(self.found.accepted);
@@ -162,14 +135,6 @@ impl Answer<'_> {
             None => &self.plant.spec,
             Some(before) => &self.found.steps[before][0].candidate.plant.spec,
         }
-    }
-
-    fn given(&self) -> Option<Series> {
-        let mut all = Series::new();
-        for r in self.recordings {
-            all.extend(r.run(self.plant, &self.plant.nominal(), self.hold).ok()?);
-        }
-        Some(all)
     }
 
     fn explanation(&self, recordings: Vec<Recording>) -> Explanation {
@@ -202,35 +167,9 @@ impl Answer<'_> {
             && follows
             && self.effects().all(|fitted| self.is_significant(fitted))
             && (adequate || explains && !curves);
-        let recorded: Series = self
-            .recordings
-            .iter()
-            .flat_map(|r| r.outputs.clone())
-            .collect();
-        // What cannot be simulated follows the recording no better than its mean.
-        let missing = || recorded.iter().map(|y| level(y)).collect::<Series>();
-        let simulated = self.given();
-        let runs = simulated.is_some();
-        let given = simulated.unwrap_or_else(missing);
-        let only = self
-            .base
-            .free_run(&self.found.baseline)
-            .unwrap_or_else(missing);
-        let with = self.whole.free_run(&self.found.fit).unwrap_or_else(missing);
+        let runs = self.free_runs();
         let l = self.base.outputs();
-        let steps = |o: usize| {
-            let column = |s: &Series| -> Vec<f64> {
-                s.iter().skip(o).step_by(l).flatten().copied().collect()
-            };
-            let y = column(&recorded);
-            FitSteps {
-                simulation: figure(&y, &column(&given)),
-                parameters_only: figure(&y, &column(&only)),
-                augmented: figure(&y, &column(&with)),
-                noise_floor: self.noise_floor(o, p_value, &y, &column(&with)),
-                improvement_95: None,
-            }
-        };
+        let steps = |o: usize| self.steps(&runs, o, p_value);
         let shows = (0..l)
             .max_by(|&a, &b| {
                 let gain = |o: usize| {
@@ -305,7 +244,7 @@ impl Answer<'_> {
                     .to_owned(),
             );
         }
-        if !runs {
+        if !runs.given_runs {
             summary.push(
                 "The equations cannot be simulated over the recording with the values of the text; the mean of the recording stands for them."
                     .to_owned(),
@@ -326,8 +265,8 @@ impl Answer<'_> {
             probability,
             summary,
             alternatives,
-            hypotheses: self.hypotheses(&recorded, &only, shows),
-            location: self.location(verdict, &recorded, &only, shows),
+            hypotheses: self.hypotheses(&runs.recorded, &runs.only, shows),
+            location: self.location(verdict, &runs.recorded, &runs.only, shows),
             fit: FitTable {
                 output: outputs[shows].clone(),
                 train: train.clone(),
@@ -382,7 +321,7 @@ impl Answer<'_> {
                 }
                 .to_owned(),
             }),
-            signals: self.signals(&recorded, &given, &only, &with),
+            signals: self.signals(&runs),
             effects,
             recordings,
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -411,40 +350,6 @@ impl Answer<'_> {
         let point = &self.whole.points(&self.found.fit)[0];
         let free = with_free_states(&self.found.plant);
         free.as_ref().unwrap_or(&self.found.plant).text_at(point)
-    }
-
-    /// Free runs of an output in blocks that their fits had not seen.
-    fn held_out(&self, output: usize, train: &FitSteps) -> Option<FitSteps> {
-        let [without, with] = self.found.held_out.as_ref()?;
-        let figure = |of: &HeldOut| {
-            let (rmse, fit_percent) = of.figure(output);
-            FitFigure { rmse, fit_percent }
-        };
-        Some(FitSteps {
-            parameters_only: figure(without),
-            augmented: figure(with),
-            ..train.clone()
-        })
-    }
-
-    /// What is left, where that is noise; else only its unforeseeable part.
-    fn noise_floor(
-        &self,
-        output: usize,
-        p_value: f64,
-        recorded: &[f64],
-        simulated: &[f64],
-    ) -> FitFigure {
-        let whole = figure(recorded, simulated);
-        if p_value >= CHANCE {
-            return whole;
-        }
-        let rmse = self.found.fit.noise.scale[output].min(whole.rmse);
-        let spread = figure(recorded, &level(recorded)).rmse;
-        FitFigure {
-            rmse,
-            fit_percent: 100.0 * (1.0 - rmse / spread.max(f64::MIN_POSITIVE)),
-        }
     }
 
     fn outputs(&self) -> Vec<(String, String)> {
@@ -521,83 +426,5 @@ impl Answer<'_> {
             _ => Differs::No,
         };
         (differs, together)
-    }
-
-    /// The error of the free run over the standard deviation of the innovations: the largest of all outputs.
-    fn strays(&self, outputs: &[OutputFit]) -> f64 {
-        let noise = self.noise();
-        let ratios = outputs.iter().filter_map(|fit| {
-            let of = noise.iter().find(|n| n.output == fit.output)?;
-            let std = of.innovation_std
-                * match of.degrees_of_freedom {
-                    None => 1.0,
-                    Some(degrees) => (degrees / (degrees - 2.0).max(0.0)).sqrt(),
-                };
-            Some(fit.train.augmented.rmse / std)
-        });
-        ratios.filter(|r| r.is_finite()).fold(0.0, f64::max)
-    }
-
-    fn noise(&self) -> Vec<NoiseFound> {
-        let noise = &self.found.fit.noise;
-        let each = self
-            .outputs()
-            .into_iter()
-            .zip(&noise.colours)
-            .zip(&noise.scale);
-        each.map(|(((output, _), colour), &scale)| NoiseFound {
-            output,
-            autoregression: colour.ar.clone(),
-            moving_average: colour.ma.clone(),
-            innovation_std: scale,
-            degrees_of_freedom: noise.degrees.is_finite().then_some(noise.degrees),
-        })
-        .collect()
-    }
-
-    fn signals(
-        &self,
-        recorded: &Series,
-        given: &Series,
-        only: &Series,
-        with: &Series,
-    ) -> Vec<SignalTraces> {
-        let l = self.base.outputs();
-        let outputs = self.outputs();
-        let residual = |fit: &Fit, study: &Study| study.residual(fit).unwrap_or_default();
-        let before = residual(&self.found.baseline, &self.base);
-        let after = residual(&self.found.fit, &self.whole);
-        let mut traces = Vec::new();
-        for (r, recording) in self.recordings.iter().enumerate() {
-            for (o, (output, unit)) in outputs.iter().enumerate() {
-                let s = r * l + o;
-                let error: Vec<f64> = recorded[s]
-                    .iter()
-                    .zip(&given[s])
-                    .map(|(y, g)| y - g)
-                    .collect();
-                let shown = extremes(&error, TRACE_POINTS);
-                let thin = |v: &[f64]| -> Vec<f64> { shown.iter().map(|&k| v[k]).collect() };
-                let h = recording.sample_time;
-                traces.push(SignalTraces {
-                    output: output.clone(),
-                    unit: unit.clone(),
-                    recording: r,
-                    time: shown
-                        .iter()
-                        .map(|&k| recording.start_time + k as f64 * h)
-                        .collect(),
-                    recorded: thin(&recorded[s]),
-                    simulated: thin(&given[s]),
-                    parameters_only: thin(&only[s]),
-                    augmented: thin(&with[s]),
-                    spectrum: spectrum_picture(
-                        &spectrum(&before, l, o, h),
-                        &spectrum(&after, l, o, h),
-                    ),
-                });
-            }
-        }
-        traces
     }
 }
