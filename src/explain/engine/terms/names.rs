@@ -4,7 +4,7 @@ use crate::physics::{Binary, Equation, ModelSpec, Node, Unknown, VariableId, Var
 
 use crate::explain::engine::fitting::edit::{Place, user_of};
 use crate::explain::engine::fitting::fitted::Fitted;
-use crate::explain::engine::terms::library::TIMES;
+use crate::explain::engine::terms::library::{TERMS, TIMES};
 use crate::explain::engine::terms::term::{Needs, Port, Term};
 
 /// What kind of quantity an argument is.
@@ -108,36 +108,36 @@ fn unused(spec: &ModelSpec, v: VariableId) -> bool {
     !spec.expressions.any(|n| *n == Node::Variable(v))
 }
 
+/// The term that a fitted one is over the values that occurred: a threshold that is exceeded throughout is none, nor is a narrow
+/// middle, and a load from the beginning on is a constant.
+fn term_in_range(found: &Fitted) -> &'static Term {
+    let (from, to) = found.range;
+    let id = match (found.lead.term.id, found.shapes.first()) {
+        ("load_step", Some(&at)) if is_early(at, found.range) => "load_constant",
+        ("above", Some(&edge)) if edge <= from + NARROW * (to - from) => "linear",
+        ("both_sides", Some(&edge)) if edge < NARROW * from.abs().max(to.abs()) => "linear",
+        ("root_above", Some(&edge)) if edge < 0.5 * (from + to) => "root",
+        (id, _) => id,
+    };
+    let simpler = TERMS.iter().find(|term| term.id == id);
+    simpler
+        .filter(|_| id != found.lead.term.id)
+        .unwrap_or(found.lead.term)
+}
+
 /// The id of what was found in a plant; `law` for a function that has no name there.
 pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
     let variables: Vec<VariableId> = found.depends.iter().filter_map(|n| spec.find(n)).collect();
-    let id = called(spec, found.lead.term, found.lead.place, &variables);
+    let term = term_in_range(found);
+    let id = called(spec, term, found.lead.place, &variables);
     // Values of the fit decide between names of one term.
-    let low = |shape: f64| shape < 0.5 * (found.range.0 + found.range.1);
-    let lowest = found.range.0 + NARROW * (found.range.1 - found.range.0);
     let fastest = found.range.0.abs().max(found.range.1.abs());
     match (id, found.shapes.first()) {
-        // A load from the beginning on is a constant: an outflow, where it is no force.
-        ("load_step", Some(&at))
-            if found.lead.term.id == "load_step"
-                && is_early(at, found.range)
-                && flows(unit_of(spec, found.lead.place.variable(spec)))
-                && found.strength() < 0.0 =>
-        {
-            "leak"
+        // What is always the same, and drives.
+        ("coulomb_friction" | "leak", _) if is_constant(term) && found.strength() > 0.0 => {
+            "load_step"
         }
-        // A force that is always the same, and drives.
-        ("coulomb_friction", None) if found.strength() > 0.0 => "load_step",
         _ if feeds(spec, id, found) => "law",
-        // With nothing between its sides it is a loss in proportion.
-        ("overflow", Some(&edge))
-            if found.lead.term.id == "both_sides" && edge < NARROW * fastest =>
-        {
-            match flows(unit_of(spec, found.lead.place.variable(spec))) {
-                true => "leak",
-                false => "law",
-            }
-        }
         ("hysteresis", Some(&slip))
             if may_be_velocity(spec, &variables) && slip < YIELDS * found.travel =>
         {
@@ -147,11 +147,13 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
         ("coulomb_friction" | "stribeck_friction", Some(&width)) if width > SATURATES * fastest => {
             "law"
         }
-        ("overflow", Some(&edge)) if found.lead.term.id == "root_above" && low(edge) => "leak",
-        // A level that is exceeded throughout is no level.
-        ("overflow", Some(&edge)) if found.lead.term.id == "above" && edge <= lowest => "leak",
         _ => id,
     }
+}
+
+/// Whether a term is the same throughout.
+fn is_constant(term: &Term) -> bool {
+    matches!(term.id, "load_constant" | "one_way_friction")
 }
 
 /// A middle this narrow, as a part of the largest size, is none, and so is a threshold this low in the range.
@@ -356,14 +358,11 @@ pub(in crate::explain::engine) fn heats_itself(
 /// same name may enter two equations, that of the variable it is a function of, else that of a derivative, else of an output.
 pub(crate) fn rank(spec: &ModelSpec, found: &Fitted) -> u8 {
     let variables: Vec<VariableId> = found.depends.iter().filter_map(|n| spec.find(n)).collect();
-    let of_term = rank_of(spec, found.lead.term, found.lead.place, &variables);
-    match (found.lead.term.id, found.shapes.first()) {
-        // A load that is there from the beginning is a constant, which comes before it.
-        ("load_step", Some(&at)) if is_early(at, found.range) => match named(spec, found) {
-            "load_step" => of_term + PLACES * (CONSTANT + 1),
-            _ => of_term,
-        },
-        ("one_way_friction", _) if named(spec, found) == "load_step" => of_term + PLACES * CONSTANT,
+    let term = term_in_range(found);
+    let of_term = rank_of(spec, term, found.lead.place, &variables);
+    match named(spec, found) {
+        // A constant by its sign: it stands behind what has a name of its own, as every constant load.
+        "load_step" if is_constant(term) && of_term < SPECIFIC => of_term + PLACES * CONSTANT,
         _ => of_term,
     }
 }
@@ -400,9 +399,9 @@ pub(in crate::explain::engine) fn rank_of(
             let from_outside =
                 term.needs == Needs::Time || variables.iter().any(|&v| unused(spec, v));
             let elsewhere = match spec.equations[at].unknown {
-                // What happens to a sensor at its own time comes last; and where nothing drives the plant a sensor lags only by where
-                // it was at the start, which a second store does too.
-                _ if term.port == Port::Sensor && term.needs == Needs::Time => 3,
+                // What a sensor does at its own time comes last; and where nothing drives the plant it lags only by where it was at
+                // the start, which a second store does too.
+                _ if term.id == "sensor_drift" => 3,
                 _ if term.port == Port::Sensor
                     && !term.memories.is_empty()
                     && spec.inputs().is_empty() =>
@@ -433,7 +432,6 @@ pub(in crate::explain::engine) fn rank_of(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::explain::engine::terms::library::TERMS;
     use crate::physics::parse;
 
     fn name(text: &str, term: &str, at: &str, of: &str) -> &'static str {
