@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::folder::{Folder, json};
+use crate::folder::Folder;
 use crate::plant_initial_states::{noise, run};
 
 /// Drag of the air alone.
@@ -32,18 +32,7 @@ fn rolling_resistance_is_dry_friction() {
             writeln!(text, "{k},{:.2}", x[0] + 0.05 * normal()).unwrap();
         }
         folder.text("log.csv", &text);
-        let explain = [
-            "explain",
-            "log.csv",
-            "--simulation",
-            "car.mo",
-            "--inputs",
-            "none",
-            "--output",
-            "e.json",
-        ];
-        folder.run(&explain).ok();
-        let said = json(&folder.join("e.json"));
+        let said = folder.explained("log.csv", "car.mo", &["--inputs", "none"]);
         let summary = &said["summary"];
         let effect = &said["effects"][0];
         assert_eq!(effect["effect"], "coulomb_friction", "{summary}");

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::folder::{Folder, json};
+use crate::folder::Folder;
 use crate::plant_initial_states::noise;
 
 /// Growth without a limit.
@@ -45,19 +45,6 @@ fn log(header: &str, step: f64, samples: usize, of: impl FnMut(f64) -> String) -
     rows.fold(header.to_owned(), |all, row| all + &row)
 }
 
-fn explained(folder: &Folder, more: &[&str]) -> serde_json::Value {
-    let explain = [
-        "explain",
-        "log.csv",
-        "--simulation",
-        "plant.mo",
-        "--output",
-        "e.json",
-    ];
-    folder.run(&[&explain[..], more].concat()).ok();
-    json(&folder.join("e.json"))
-}
-
 /// From the growth rate that makes up for the limit a fit of the limit does not find back.
 #[test]
 fn the_limit_of_a_growth_is_found_by_the_library_and_by_a_hypothesis() {
@@ -71,38 +58,44 @@ fn the_limit_of_a_growth_is_found_by_the_library_and_by_a_hypothesis() {
     folder.text("log.csv", &text);
     let hypothesis = ["--hypothesis", "limit: der(N) += -c*N^2/3600, c > 0"];
     for more in [&[][..], &hypothesis] {
-        let said = explained(&folder, more);
+        let said = folder.explained("log.csv", "plant.mo", more);
         assert_eq!(said["verdict"], "named", "{}", said["summary"]);
         let fit = &said["fit"]["train"]["augmented"]["fit_percent"];
         assert!(fit.as_f64().unwrap() > 97.0, "{}", said["summary"]);
         let equation = said["effects"][0]["equation"].as_str().unwrap();
         assert!(equation.contains("N^2"), "{equation}");
         if let Some(asked) = said["hypotheses"].get(0) {
+            assert_eq!(asked["verdict"], "best", "{asked}");
             let c = asked["parameters"]["c"]["value"].as_f64().unwrap();
             assert!((c - 0.547 / 663.0).abs() < 1e-4, "{asked}");
         }
     }
 }
 
-/// What the equations miss by half of its variance is not explained by them, whatever a noise model says.
+/// Slow noise about a level has nothing to do with an exponential decay. Where the best of these explains less than half of the
+/// variance (a fit below 29.3 %), the noise model explains the recording, not the equations.
 #[test]
 fn equations_that_do_not_follow_are_not_consistent() {
     let folder = Folder::new();
     folder.text("plant.mo", BOLUS);
-    let mut normal = noise(2);
-    let text = log("t,y\n", 1800.0, 49, |t| {
-        let h = t / 3600.0;
-        let c = 12.0 * ((-0.09 * h).exp() - (-0.9 * h).exp());
-        format!("{t},{:.2}\n", c + 0.1 * normal())
-    });
-    folder.text("log.csv", &text);
-    let said = explained(&folder, &[]);
-    let verdict = said["verdict"].as_str().unwrap();
-    assert!(
-        matches!(verdict, "named" | "unexplained"),
-        "{verdict}: {}",
-        said["summary"]
-    );
+    let mut poor = 0;
+    for seed in 0..4 {
+        let (mut normal, mut x) = (noise(seed), 0.0);
+        let text = log("t,y\n", 60.0, 300, |t| {
+            x = 0.98 * x + normal();
+            format!("{t},{:.3}\n", 10.0 + x)
+        });
+        folder.text("log.csv", &text);
+        let said = folder.explained("log.csv", "plant.mo", &[]);
+        let fit = &said["fit"]["train"]["parameters_only"]["fit_percent"];
+        if fit.as_f64().unwrap() < 29.3 {
+            poor += 1;
+            let verdict = said["verdict"].as_str().unwrap();
+            let quiet = matches!(verdict, "consistent" | "parameters");
+            assert!(!quiet, "{seed}: {verdict}: {}", said["summary"]);
+        }
+    }
+    assert!(poor >= 2, "{poor} of 4");
 }
 
 #[test]
@@ -119,7 +112,7 @@ fn a_capacitor_that_discharges_itself_leaks() {
         }
     }
     folder.text("log.csv", &text);
-    let said = explained(&folder, &[]);
+    let said = folder.explained("log.csv", "plant.mo", &[]);
     let effect = &said["effects"][0];
     assert_eq!(effect["effect"], "leak", "{}", said["summary"]);
     // In proportion to the voltage, or to what it is above a threshold near 0.

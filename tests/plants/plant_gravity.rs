@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::folder::{Folder, json};
+use crate::folder::Folder;
 use crate::plant_initial_states::{noise, run};
 
 const PENDULUM: &str = r#"model Pendulum
@@ -29,16 +29,7 @@ fn gravity_is_found_in_a_swing() {
         writeln!(text, "{},{}", 0.02 * k as f64, x[0] + 0.01 * normal()).unwrap();
     }
     folder.text("log.csv", &text);
-    let explain = [
-        "explain",
-        "log.csv",
-        "--simulation",
-        "pendulum.mo",
-        "--output",
-        "e.json",
-    ];
-    folder.run(&explain).ok();
-    let said = json(&folder.join("e.json"));
+    let said = folder.explained("log.csv", "pendulum.mo", &[]);
     assert_eq!(said["verdict"], "named", "{}", said["summary"]);
     assert_eq!(
         said["effects"][0]["effect"], "gravity_torque",

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::folder::{Folder, json};
+use crate::folder::Folder;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -89,16 +89,7 @@ fn a_second_mass_that_starts_elsewhere_predicts_another_recording() {
     // With most noises a fit of four attempts a step did not move, and slow noise stood for the cup.
     for seed in [1, 3, 4, 5] {
         folder.text("log.csv", &cooling([90.0, 20.0], seed).0);
-        let explain = [
-            "explain",
-            "log.csv",
-            "--simulation",
-            "cup.mo",
-            "--output",
-            "e.json",
-        ];
-        folder.run(&explain).ok();
-        let said = json(&folder.join("e.json"));
+        let said = folder.explained("log.csv", "cup.mo", &[]);
         let summary = &said["summary"];
         assert_eq!(
             said["effects"][0]["effect"], "extra_mode",
@@ -142,16 +133,7 @@ fn a_lag_of_a_sensor_shows_in_one_step() {
         writeln!(text, "{},2,{}", 5 * k, x[1] + 0.1 * normal()).unwrap();
     }
     folder.text("log.csv", &text);
-    let explain = [
-        "explain",
-        "log.csv",
-        "--simulation",
-        "heater.mo",
-        "--output",
-        "e.json",
-    ];
-    folder.run(&explain).ok();
-    let said = json(&folder.join("e.json"));
+    let said = folder.explained("log.csv", "heater.mo", &[]);
     assert_eq!(
         said["effects"][0]["effect"], "sensor_lag",
         "{}",

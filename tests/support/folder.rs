@@ -59,6 +59,13 @@ impl Folder {
         names
     }
 
+    /// Explains the recording `log` against the plant in equations `plant`; gives the document, which is `e.json`.
+    pub fn explained(&self, log: &str, plant: &str, more: &[&str]) -> Value {
+        let explain = ["explain", log, "--simulation", plant, "--output", "e.json"];
+        self.run(&[&explain[..], more].concat()).ok();
+        json(&self.join("e.json"))
+    }
+
     /// Runs `innovant` in this folder.
     pub fn run(&self, arguments: &[&str]) -> Run {
         self.run_with_input(arguments, Vec::new())

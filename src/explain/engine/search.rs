@@ -89,7 +89,8 @@ impl Found {
 }
 
 /// What blocks left out say of free runs, where values that depend on each other make a criterion weak: a candidate that the
-/// criterion does not speak against is accepted if it takes more than half of the mean square off them, and named where it takes as much off what any other function leaves.
+/// criterion does not speak against is accepted if it takes more than half of the mean square off them, and named where it takes
+/// as much off what any other function leaves.
 /// One that halves what the best leaves comes before it. What depends on time alone is not accepted so: its value in a block is a
 /// level that any slow error has.
 fn judge_by_blocks(

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::fitting::candidate::{Candidate, candidate};
 use super::fitting::edit::Place;
 use super::fitting::finish::finished;
-use super::fitting::fitted::{Fitted, TIE, order, searched, with_more};
+use super::fitting::fitted::{Fitted, TIE, forms, order, searched, with_more};
 use super::fitting::formulas::formulas;
 use super::fitting::refined_curve::refined_curve;
 use super::fitting::release::released;
@@ -237,7 +237,16 @@ pub(super) fn step(stage: &Stage) -> Step {
     }
     let more = times_more(study.count());
     // What the plant's parameters have done to make up for a term may lead far from what they are beside it.
-    let text = (accepted == 0 && more > 1).then(|| study.nominal());
+    let text = (accepted == 0).then(|| study.nominal());
+    let of_text = |from: &Fit| {
+        let mut point = from.point.clone();
+        let text = text.as_ref()?;
+        point[..text.len()].copy_from_slice(text);
+        Some(Fit {
+            point,
+            ..from.clone()
+        })
+    };
     let mut glanced: Vec<(f64, Lead, usize, Candidate, Fit)> = tried
         .iter()
         .enumerate()
@@ -262,16 +271,9 @@ pub(super) fn step(stage: &Stage) -> Step {
                 0 => inner.glance(start, GLANCE),
                 _ => inner.refit(start, 0, GLANCE),
             };
-            let of_text = text.as_ref().and_then(|text| {
-                let mut point = from.point.clone();
-                point[..text.len()].copy_from_slice(text);
-                let text = Fit {
-                    point,
-                    ..from.clone()
-                };
-                glance(&made.from(&text, parameters))
-            });
-            let fitted = (glance(&start).into_iter().chain(of_text))
+            let text = of_text(from).filter(|_| more > 1);
+            let otherwise = text.and_then(|text| glance(&made.from(&text, parameters)));
+            let fitted = (glance(&start).into_iter().chain(otherwise))
                 .min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
             let again = |fit: &Fit| inner.refit(fit, 0, GLANCE);
             let fitted = released(&inner, lead.term, parameters, fitted, &again);
@@ -306,17 +308,7 @@ pub(super) fn step(stage: &Stage) -> Step {
             let options = with_more(options, made.values.len());
             let rough = made.rough(MOST_STEPS);
             let inner = study.of(&rough, &options).ok()?;
-            // Where an observer had to follow what was missing, a free run may do now.
-            let mut starts = vec![from.clone()];
-            if from.form != fit.form {
-                let mut point = from.point.clone();
-                point.extend(&fit.point[fit.point.len() - study.gains()..]);
-                starts.push(Fit {
-                    form: fit.form,
-                    point,
-                    ..from
-                });
-            }
+            let starts = forms(from, fit, study.gains());
             let best = starts
                 .iter()
                 .filter_map(|start| match made.new_states {
@@ -356,13 +348,15 @@ pub(super) fn step(stage: &Stage) -> Step {
     fitted.retain(|f| scope.allows(named(&plant.spec, f)));
     let mut origins = vec![fit];
     origins.extend(tried.iter().skip(1).map(|(_, white)| white));
-    // From the values of the text too: those of the fit may have made up for what is asked.
-    let white = (origins.iter().copied()).find(|o| o.form == Form::FreeRun);
-    let of_text = white.filter(|_| accepted == 0).map(|white| Fit {
-        point: study.nominal(),
-        ..white.clone()
-    });
-    origins.extend(&of_text);
+    // In free run with white noise: under the noise of a fit that does not follow, the values of the text lead to another that
+    // does not.
+    let free = Fit {
+        form: Form::FreeRun,
+        point: fit.point[..study.nominal().len()].to_vec(),
+        ..fit.clone()
+    };
+    let text = study.gaussian(&free).and_then(|from| of_text(&from));
+    origins.extend(&text);
     let ground = Ground {
         plant,
         study,

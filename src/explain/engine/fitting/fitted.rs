@@ -81,9 +81,25 @@ impl Fitted {
     }
 }
 
+/// A start in its own form and in that of the fit before: where an observer had to follow what was missing, a free run may do now.
+pub(in crate::explain::engine) fn forms(from: Fit, before: &Fit, gains: usize) -> Vec<Fit> {
+    let mut starts = vec![from.clone()];
+    if from.form != before.form {
+        let mut point = from.point.clone();
+        point.extend(&before.point[before.point.len() - gains..]);
+        starts.push(Fit {
+            form: before.form,
+            point,
+            ..from
+        });
+    }
+    starts
+}
+
 /// Penalty for the values of a shape that were searched.
 pub(in crate::explain::engine) fn searched(lead: &Lead, recordings: &[PlantRecording]) -> f64 {
-    let samples = recordings.iter().map(|r| r.outputs[0].len()).sum::<usize>() as f64;
+    let values = recordings.iter().flat_map(|r| &r.outputs[0]);
+    let samples = values.filter(|y| y.is_finite()).count() as f64;
     lead.term
         .shapes
         .iter()

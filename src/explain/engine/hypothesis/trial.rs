@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::{Change, Hypothesis, NewNumber};
 use crate::explain::engine::fitting::candidate::Candidate;
 use crate::explain::engine::fitting::edit::{Edit, Place, literal, sensors};
-use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
+use crate::explain::engine::fitting::fitted::{Fitted, TIE, forms, with_more};
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::term::{Needs, Port, Term};
 use crate::explain::engine::thresholds::{GLANCE, NEEDED, ROUNDS, SECOND, SURE, THOROUGH};
@@ -118,15 +118,12 @@ impl Hypothesis {
             .into_par_iter()
             .filter_map(|(_, _, made, from)| {
                 let study = ground.study.of(&made.plant, &options).ok()?;
-                let mut from = from.clone();
-                if from.form != ground.fit.form {
-                    // From free run to the observer of the fit before.
-                    let gains = ground.study.gains();
-                    let gains = &ground.fit.point[ground.fit.point.len() - gains..];
-                    from.point.extend(gains);
-                    from.form = ground.fit.form;
-                }
-                let fit = study.refit(&from, ROUNDS, THOROUGH)?;
+                // As many noise models as a term of the library has: one when it is compared, and those of its last fit.
+                let starts = forms(from.clone(), ground.fit, ground.study.gains());
+                let fits = starts
+                    .iter()
+                    .filter_map(|start| study.refit(start, 1 + ROUNDS, THOROUGH));
+                let fit = fits.min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
                 Some((fit, *made))
             })
             .collect::<Vec<_>>()

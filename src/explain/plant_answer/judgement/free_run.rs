@@ -11,8 +11,8 @@ pub(in crate::explain::plant_answer) const STRAYS: f64 = 2.0;
 const LOOKED_AT: usize = 16;
 
 /// Whether the free run of an output leaves half of its variance, and far more than predictions of the next sample do or would: a
-/// noise model or an observer has taken over what the equations should do, or nothing has. Of an unstable plant whose inputs hold it a free run says
-/// nothing.
+/// noise model or an observer has taken over what the equations should do, or nothing has. Of an unstable plant that its inputs hold
+/// a free run says nothing.
 pub(in crate::explain::plant_answer) fn is_astray(
     outputs: &[OutputFit],
     strays: f64,
