@@ -25,8 +25,8 @@ pub(super) fn holm(p_values: &[Option<f64>], level: f64) -> Vec<bool> {
     rejected
 }
 
-/// A share of the residual variance that predictions leave unused beyond this is no white noise, even where the uncertainty of the
-/// parameters allows it: a tenth of the variance is a twentieth of the residual's size.
+/// Residuals of which the past explains a larger share are not called white, even where the uncertainty of the parameters allows it.
+/// Using a tenth of the variance would make predictions better by a twentieth of the residual's size.
 const ALLOWED_SHARE: f64 = 0.1;
 
 /// Share of the level at which what is only information gets a sentence.
@@ -249,6 +249,39 @@ mod tests {
         assert_eq!(reject([0.02, 0.02, 0.02], 0.05), [false, false, false]);
         assert_eq!(holm(&[None, Some(0.04), None], 0.05), [false, true, false]);
         assert_eq!(holm(&[None], 0.05), [false]);
+    }
+
+    /// A judgement of a fresh recording whose past inputs explain this share of the residuals with this p-value.
+    fn judged(share: f64, p_value: f64) -> Validation {
+        let test = serde_json::json!({
+            "statistic": 1.2, "degrees_of_freedom": 7, "fitted_directions": 0, "variance_inflation": 1.0,
+            "p_value": p_value, "explained_share": share, "explained_share_by_channel": [share], "strongest": null,
+        });
+        let fit = serde_json::json!({"fit_percent": 90.0, "outputs": []});
+        let mut validation: Validation = serde_json::from_value(serde_json::json!({
+            "relation": "fresh", "samples": 148, "tested_samples": 140, "start_up_samples": 0, "lags": 7, "level": 0.01,
+            "one_step": fit, "free_run": null, "free_run_unavailable": null, "whiteness": null, "past_inputs": test,
+            "own_past_lags": 1, "same_sample": null, "feedback": null, "innovation_size": null, "autocorrelation": [],
+            "cross_correlation": [], "rejected": false, "findings": [],
+        }))
+        .unwrap();
+        decide(&mut validation, true);
+        validation
+    }
+
+    #[test]
+    fn what_uncertain_parameters_allow_is_not_called_white() {
+        let allowed = judged(0.76, 0.99);
+        assert!(!allowed.rejected && allowed.allowed_by_uncertainty().is_some());
+        assert!(
+            allowed.findings[0]
+                .starts_with("the past predicts 76 % of the residual variance, which")
+        );
+        let white = judged(0.09, 0.5);
+        assert!(white.allowed_by_uncertainty().is_none());
+        assert!(white.findings[0].starts_with("the residuals are white"));
+        let rejected = judged(0.76, 1e-6);
+        assert!(rejected.rejected && rejected.allowed_by_uncertainty().is_none());
     }
 
     #[test]

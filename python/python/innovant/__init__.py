@@ -4,7 +4,7 @@
 >>> u, y, dt = innovant.examples.closed_loop(2000)
 >>> model = innovant.identify(u, y, dt=dt)
 >>> print(model.verdict)
-Order 4 model of 2 outputs from 2 inputs, 2000 samples, 1 s: the residuals are white and linear in the past
+Order 4 model of 2 outputs from 2 inputs, 2000 samples, 1 s: the residuals are white and show no nonlinearity
 """
 
 from . import examples

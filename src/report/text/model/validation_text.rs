@@ -72,7 +72,7 @@ pub(crate) fn in_words(tests: &Validation) -> &'static str {
         _ if tests.allowed_by_uncertainty().is_some() => {
             "its uncertain parameters allow the structure in the residuals"
         }
-        (_, Some(_)) => "the residuals are white and linear in the past",
+        (_, Some(_)) => "the residuals are white and show no nonlinearity",
         (Some(_), None) => "the residuals are white; linearity was not tested",
         (None, None) => "nothing speaks against it; linearity was not tested",
     }
