@@ -68,13 +68,35 @@ pub fn recordings(
     inputs: &[String],
     outputs: &[String],
 ) -> PyResult<Vec<Log>> {
-    let count = u.len();
-    u.iter()
-        .zip(y)
-        .enumerate()
-        .map(|(index, (u, y))| {
-            let name = recording_name(index, count);
-            recording(&name, dt, (inputs, outputs), (columns(u), columns(y)))
+    each(u, y, |name, (u, y)| {
+        recording(name, dt, (inputs, outputs), (u, y))
+    })
+}
+
+/// The same for plants in equations and simulators, which are compared with the outputs that are not NaN.
+pub fn sparse_recordings(
+    u: &[Samples<'_>],
+    y: &[Samples<'_>],
+    dt: f64,
+    inputs: &[String],
+    outputs: &[String],
+) -> PyResult<Vec<Log>> {
+    each(u, y, |name, data| {
+        let named = (channels(inputs), channels(outputs));
+        Log::with_missing_outputs(name, dt, named, data).map_err(raise)
+    })
+}
+
+fn each(
+    u: &[Samples<'_>],
+    y: &[Samples<'_>],
+    recording: impl Fn(&str, (Vec<Vec<f64>>, Vec<Vec<f64>>)) -> PyResult<Log>,
+) -> PyResult<Vec<Log>> {
+    let pairs = u.iter().zip(y).enumerate();
+    pairs
+        .map(|(index, (one_u, one_y))| {
+            let name = recording_name(index, u.len());
+            recording(&name, (columns(one_u), columns(one_y)))
         })
         .collect()
 }

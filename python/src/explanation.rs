@@ -13,7 +13,9 @@ use innovant::report::{explanation_page, parse_explanation, to_json};
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
 
-use crate::arrays::{Samples, columns, recording, recording_name, recordings, samples, slices};
+use crate::arrays::{
+    Samples, columns, recording, recording_name, recordings, samples, slices, sparse_recordings,
+};
 use crate::errors::raise;
 use crate::model::Model;
 use crate::plant::Plant;
@@ -150,7 +152,7 @@ pub fn explain_plant(
     without: Vec<String>,
     hypotheses: Vec<String>,
 ) -> PyResult<Explanation> {
-    let logs = recordings(&u, &y, dt, &names.0, &names.1)?;
+    let logs = sparse_recordings(&u, &y, dt, &names.0, &names.1)?;
     let known = logs.iter().map(|log| Recording::of_log(log, None));
     let known: Vec<Recording> = known.collect();
     let at_values = plant.core.with_values(&plant.point.parameters);

@@ -15,7 +15,7 @@ use innovant::report::{
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::arrays::{Samples, columns, matrix, recordings, samples, slices};
+use crate::arrays::{Samples, columns, matrix, samples, slices, sparse_recordings};
 use crate::errors::{check_level, raise};
 
 /// A plant in equations.
@@ -226,7 +226,7 @@ impl Plant {
             },
             least_squares,
         };
-        let logs = recordings(&u, &y, dt, &self.inputs(), &self.outputs())?;
+        let logs = sparse_recordings(&u, &y, dt, &self.inputs(), &self.outputs())?;
         let records = logs.iter().map(PlantRecording::from).collect::<Vec<_>>();
         let start = self.core.with_values(&self.point.parameters);
         py.detach(|| {
@@ -256,7 +256,7 @@ impl Plant {
             form: Some(Form::FreeRun),
             least_squares: true,
         };
-        let logs = recordings(&[u], &[y], dt, &self.inputs(), &self.outputs())?;
+        let logs = sparse_recordings(&[u], &[y], dt, &self.inputs(), &self.outputs())?;
         let plant = self.core.with_values(&self.point.parameters);
         let start = py.detach(|| {
             let records: Vec<PlantRecording> = logs.iter().map(PlantRecording::from).collect();
@@ -285,7 +285,7 @@ impl Plant {
         Vec<Bound<'py, PyArray2<f64>>>,
     )> {
         check_level(level)?;
-        let logs = recordings(&u, &y, dt, &self.inputs(), &self.outputs())?;
+        let logs = sparse_recordings(&u, &y, dt, &self.inputs(), &self.outputs())?;
         let held = match &self.document {
             None => text_alone(&self.point, self.hold(hold)?),
             Some(document) => {
@@ -397,7 +397,7 @@ impl Plant {
         let Some(document) = &self.document else {
             return Err(raise("a plant that was not estimated has no page"));
         };
-        let logs = recordings(&u, &y, dt, &self.inputs(), &self.outputs())?;
+        let logs = sparse_recordings(&u, &y, dt, &self.inputs(), &self.outputs())?;
         py.detach(|| {
             let records = logs.iter().map(PlantRecording::from).collect::<Vec<_>>();
             let held = document.held_with_starts(&self.core, &self.point);

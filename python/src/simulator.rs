@@ -13,7 +13,7 @@ use numpy::ndarray::Array2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{Samples, columns, recordings};
+use crate::arrays::{Samples, columns, sparse_recordings};
 use crate::errors::raise;
 
 /// What the function raised, kept to be raised again.
@@ -98,7 +98,7 @@ pub fn estimate_simulator(
             description: String::new(),
         })
         .collect();
-    let logs = recordings(&u, &y, dt, &inputs, &outputs)?;
+    let logs = sparse_recordings(&u, &y, dt, &inputs, &outputs)?;
     let records: Vec<PlantRecording> = logs.iter().map(PlantRecording::from).collect();
     let raised = Raised::default();
     let function = Function {

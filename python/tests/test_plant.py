@@ -48,6 +48,20 @@ def test_parameters_are_found_with_their_uncertainty(tmp_path):
     json.loads((tmp_path / "plant.json").read_text())
 
 
+def test_outputs_that_are_nan_are_not_compared():
+    plant = innovant.Plant(TEXT)
+    u, y = recording(plant)
+    sparse = y.copy()
+    sparse[np.arange(len(y)) % 4 != 0] = np.nan
+    every, fourth = (plant.fit(u, of, dt=0.03).estimates["m"] for of in (y, sparse))
+    assert abs(fourth.value - 0.5) < 4 * fourth.std
+    assert 1.5 < fourth.std / every.std < 2.7
+    assert innovant.explain(u, sparse, dt=0.03, simulation=plant).verdict in ("consistent", "parameters")
+    u[3] = np.nan
+    with pytest.raises(innovant.InnovantError, match="u.*3.*NaN"):
+        plant.fit(u, y, dt=0.03)
+
+
 def test_linearised_at_rest():
     a, b, c, d = innovant.Plant(TEXT).linearise()
     inertia = 0.45 * 0.16

@@ -434,6 +434,11 @@ impl LogError {
             )
     }
 
+    /// Whether the times are on no uniform grid.
+    pub(super) fn is_irregular(&self) -> bool {
+        matches!(self, Self::IrregularStep { .. } | Self::ClockDrift { .. })
+    }
+
     /// Whether the reader of our standard output has gone (`innovant ... | head`): success for a command line.
     pub fn is_broken_pipe(&self) -> bool {
         matches!(self, Self::Write { source, .. } if source.kind() == io::ErrorKind::BrokenPipe)

@@ -9,8 +9,8 @@ use super::record::Log;
 use super::roles::{Missing, RoleNeed, Roles};
 use super::text::{Source, Stream};
 use super::time::{
-    Filled, Origin, Piece, Resampling, Rows, SHORTEST, Tally, check_sample_time, counted, fill,
-    readable, time_grid,
+    Filled, Origin, Piece, Resampling, Rows, SHORTEST, Tally, check_sample_time, common_step,
+    counted, fill, readable, time_grid,
 };
 use crate::limits;
 
@@ -229,6 +229,7 @@ impl Assembly<'_> {
         if let (Some(asked), Some((index, stamps))) = (self.roles.sample_time, &time) {
             check_sample_time(header, *index, stamps.seconds.iter().copied(), asked)?;
         }
+        let mut wanted = self.roles.resample;
         let (pieces, step) = match (self.roles.sample_time, time) {
             (None, Some((index, stamps))) => {
                 let column = header.column(index);
@@ -244,7 +245,14 @@ impl Assembly<'_> {
                     rounding: stamps.rounding,
                     same: &same,
                 };
-                let grid = time_grid::lay(&rows, self.roles.missing, self.roles.resample)?;
+                let grid = match time_grid::lay(&rows, self.at_gaps(), wanted) {
+                    Err(error) if self.keeps() && wanted.is_none() && error.is_irregular() => {
+                        wanted = Some(common_step(rows.stamps).ok_or(error)?);
+                        said.push("irregular times".to_owned());
+                        time_grid::lay(&rows, Missing::Interpolate, wanted)
+                    }
+                    grid => grid,
+                }?;
                 said.extend(grid.said);
                 (grid.pieces, grid.step)
             }
@@ -262,7 +270,7 @@ impl Assembly<'_> {
                 )
             }
         };
-        let parts = match self.roles.resample {
+        let parts = match wanted {
             Some(wanted) => self.resampled(&pieces, step, wanted, said),
             None => self.gridded(&pieces, step, said),
         };
@@ -291,14 +299,31 @@ impl Assembly<'_> {
                 parts.len()
             ));
         }
-        let step = self.roles.resample.unwrap_or(step);
+        let step = wanted.unwrap_or(step);
         let logs: Vec<Log> = parts
             .iter()
             .enumerate()
             .map(|(index, (start, part))| self.log(index, parts.len(), step, *start, part))
             .collect();
-        logs.iter().try_for_each(Log::check)?;
+        let check = match self.keeps() {
+            true => Log::check_but_missing_outputs,
+            false => Log::check,
+        };
+        logs.iter().try_for_each(check)?;
         Ok(logs)
+    }
+
+    /// Whether outputs that are missing stay so.
+    fn keeps(&self) -> bool {
+        self.roles.missing == Missing::Keep
+    }
+
+    /// What is done where rows are missing: nothing cuts a recording of which only outputs are read, and these may be missing.
+    fn at_gaps(&self) -> Missing {
+        match self.keeps() && self.table.assigned.inputs.is_empty() {
+            true => Missing::Interpolate,
+            false => self.roles.missing,
+        }
     }
 
     fn log(
@@ -373,10 +398,17 @@ impl Assembly<'_> {
     /// Parts with the time of their first sample.
     fn gridded(&self, pieces: &[Piece], step: f64, said: &mut Vec<String>) -> Vec<(f64, Filled)> {
         let mut tally = Tally::default();
+        let inputs = self.table.assigned.inputs.len();
         let mut parts = Vec::new();
         for piece in pieces {
             let start = phase(piece, step);
-            for part in fill(piece, &self.table.columns, self.roles.missing, &mut tally) {
+            for part in fill(
+                piece,
+                &self.table.columns,
+                inputs,
+                self.roles.missing,
+                &mut tally,
+            ) {
                 parts.push((start + part.from as f64 * step, part));
             }
         }
@@ -409,6 +441,13 @@ impl Assembly<'_> {
             }
             said.push(text);
         }
+        for (count, name) in (tally.kept.iter().zip(self.names())).filter(|(count, _)| **count > 0)
+        {
+            said.push(format!(
+                "{} of `{name}`: compared where it has values",
+                counted(*count, "missing value")
+            ));
+        }
         if tally.longest > 1 {
             said.push(format!("at most {} missing in a row", tally.longest));
         }
@@ -439,9 +478,11 @@ impl Assembly<'_> {
         said: &mut Vec<String>,
     ) -> Vec<(f64, Filled)> {
         let inputs = self.table.assigned.inputs.len();
+        // On a finer grid outputs may stay missing between the rows.
+        let places = self.keeps() && wanted <= step * (1.0 + 1e-6);
         let mut parts = Vec::new();
         for piece in pieces {
-            // Each channel by the rows that have it; the grid is where all of them are.
+            // Each channel by the rows that have it; the grid is where all of them are, but for those that may be missing.
             let known: Vec<(Vec<f64>, Vec<f64>)> = self
                 .table
                 .columns
@@ -453,14 +494,18 @@ impl Assembly<'_> {
                         .unzip()
                 })
                 .collect();
-            let from = known
-                .iter()
-                .map(|k| k.0.first().copied().unwrap_or(f64::INFINITY))
-                .fold(f64::NEG_INFINITY, f64::max);
-            let to = known
-                .iter()
-                .map(|k| k.0.last().copied().unwrap_or(f64::NEG_INFINITY))
-                .fold(f64::INFINITY, f64::min);
+            let ends = |k: &(Vec<f64>, Vec<f64>)| Some((*k.0.first()?, *k.0.last()?));
+            let all = (piece
+                .times
+                .first()
+                .copied()
+                .zip(piece.times.last().copied()))
+            .unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
+            let required = known.iter().take(if places { inputs } else { known.len() });
+            let (from, to) = required.fold(all, |(from, to), k| {
+                let (first, last) = ends(k).unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
+                (from.max(first), to.min(last))
+            });
             if to - from < wanted {
                 continue;
             }
@@ -471,25 +516,30 @@ impl Assembly<'_> {
                     let own = (times.last().copied().unwrap_or(0.0)
                         - times.first().copied().unwrap_or(0.0))
                         / (times.len().max(2) - 1) as f64;
-                    Resampling {
+                    let grid = Resampling {
                         times,
                         step: own,
                         wanted,
                         from,
                         to,
+                    };
+                    match (places, index < inputs) {
+                        (true, false) => grid.placed(values),
+                        (true, true) => grid.joined(values, true),
+                        (false, held) => grid.column(values, held),
                     }
-                    .column(values, index < inputs)
                 })
                 .collect();
             parts.push((from, Filled { from: 0, columns }));
         }
-        let how = if wanted > step {
-            "low-pass filtered and put"
-        } else {
-            "inputs held, outputs joined by lines, put"
+        let how = match (wanted > step, places) {
+            (_, true) => "inputs held, outputs compared only where they were measured,",
+            (true, _) => "low-pass filtered and put",
+            (false, _) => "inputs held, outputs joined by lines, put",
         };
         said.push(format!(
-            "{how} on a grid of {wanted} s from steps of about {} s",
+            "{how} on a grid of {} s from steps of about {} s",
+            readable(wanted),
             readable(step)
         ));
         parts

@@ -117,6 +117,30 @@ impl Log {
         input_data: Vec<Vec<f64>>,
         output_data: Vec<Vec<f64>>,
     ) -> Result<Self, LogError> {
+        let (channels, data) = ((inputs, outputs), (input_data, output_data));
+        Self::of_columns(name, sample_time, channels, data, false)
+    }
+
+    /// As [`Log::from_columns`] where outputs may be NaN: not measured. Plants in equations are compared with the others.
+    ///
+    /// # Errors
+    /// As [`Log::from_columns`], but for outputs that are NaN.
+    pub fn with_missing_outputs(
+        name: &str,
+        sample_time: f64,
+        channels: (Vec<Channel>, Vec<Channel>),
+        data: (Vec<Vec<f64>>, Vec<Vec<f64>>),
+    ) -> Result<Self, LogError> {
+        Self::of_columns(name, sample_time, channels, data, true)
+    }
+
+    fn of_columns(
+        name: &str,
+        sample_time: f64,
+        (inputs, outputs): (Vec<Channel>, Vec<Channel>),
+        (input_data, output_data): (Vec<Vec<f64>>, Vec<Vec<f64>>),
+        outputs_may_be_missing: bool,
+    ) -> Result<Self, LogError> {
         let log = Self {
             name: name.to_owned(),
             sample_time,
@@ -127,7 +151,7 @@ impl Log {
             output_data,
             sha256: None,
         };
-        log.check()?;
+        log.check_values(outputs_may_be_missing)?;
         Ok(log)
     }
 
@@ -136,6 +160,15 @@ impl Log {
     /// # Errors
     /// As [`Log::from_columns`].
     pub fn check(&self) -> Result<(), LogError> {
+        self.check_values(false)
+    }
+
+    /// The same of a recording whose outputs may be NaN where they were not measured.
+    pub(super) fn check_but_missing_outputs(&self) -> Result<(), LogError> {
+        self.check_values(true)
+    }
+
+    fn check_values(&self, outputs_may_be_missing: bool) -> Result<(), LogError> {
         let sample_time = self.sample_time;
         if !is_sample_time(sample_time) {
             return Err(LogError::InvalidSampleTime { sample_time });
@@ -158,11 +191,12 @@ impl Log {
         if expected == 0 {
             return Err(LogError::too_short(&self.name, 0, 1, "a recording"));
         }
-        for (channel, data) in self
+        for (index, (channel, data)) in self
             .inputs
             .iter()
             .chain(&self.outputs)
             .zip(self.channel_data())
+            .enumerate()
         {
             let (name, column) = (self.name.clone(), channel.to_string());
             if data.len() != expected {
@@ -173,7 +207,9 @@ impl Log {
                     found: data.len(),
                 });
             }
-            let stray = data.iter().enumerate().find(|(_, v)| !v.is_finite());
+            let may_be_missing = outputs_may_be_missing && index >= self.inputs.len();
+            let is_value = |v: f64| v.is_finite() || v.is_nan() && may_be_missing;
+            let stray = data.iter().enumerate().find(|(_, v)| !is_value(**v));
             if let Some((sample, value)) = stray {
                 return Err(LogError::ColumnNotFinite {
                     name,

@@ -47,6 +47,9 @@ pub enum Missing {
     Split,
     /// All are interpolated.
     Interpolate,
+    /// Outputs stay missing, as NaN: for equations, which are compared with what was measured only. Inputs are interpolated
+    /// up to two in a row, the recording is split at more; at irregular times they are held.
+    Keep,
 }
 
 impl Missing {

@@ -7,7 +7,7 @@ use super::{Mask, Series};
 /// Number of independent values whose mean is as uncertain as that of the residual, summed over recordings and outputs: the
 /// number of values over the integrated autocorrelation time `1 + 2 (r1 + r2 + ...)`. Sums of two neighbours are added while
 /// they are positive, each at most as large as the one before (C. J. Geyer, *Statistical Science* 7, 1992, section 3.3:
-/// the initial monotone sequence).
+/// the initial monotone sequence). Lags count the values that are there.
 pub(crate) fn effective_samples(residual: &Series, mask: &Mask) -> f64 {
     residual
         .iter()
@@ -17,18 +17,15 @@ pub(crate) fn effective_samples(residual: &Series, mask: &Mask) -> f64 {
 }
 
 fn of_one(e: &[f64], keep: &[bool]) -> f64 {
-    let count = keep.iter().filter(|k| **k).count();
+    let known = e.iter().zip(keep).filter(|(_, k)| **k);
+    let mut padded: Vec<f64> = known.map(|(e, _)| *e).collect();
+    let count = padded.len();
     if count < 4 {
         return count as f64;
     }
-    let known = e.iter().zip(keep).filter(|(_, k)| **k);
-    let mean = known.map(|(e, _)| e).sum::<f64>() / count as f64;
-    let mut padded: Vec<f64> = e
-        .iter()
-        .zip(keep)
-        .map(|(e, &k)| if k { e - mean } else { 0.0 })
-        .collect();
-    padded.resize(2 * e.len().next_power_of_two(), 0.0);
+    let mean = padded.iter().sum::<f64>() / count as f64;
+    padded.iter_mut().for_each(|e| *e -= mean);
+    padded.resize(2 * count.next_power_of_two(), 0.0);
     let mut planner = RealFftPlanner::<f64>::new();
     let forward = planner.plan_fft_forward(padded.len());
     let backward = planner.plan_fft_inverse(padded.len());
@@ -43,7 +40,7 @@ fn of_one(e: &[f64], keep: &[bool]) -> f64 {
     }
     let mut time = -1.0;
     let mut last = f64::INFINITY;
-    for pair in covariance[..e.len() / 2 * 2].chunks(2) {
+    for pair in covariance[..count / 2 * 2].chunks(2) {
         let sum = (pair[0] + pair[1]) / covariance[0];
         if sum <= 0.0 {
             break;

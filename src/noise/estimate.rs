@@ -93,9 +93,9 @@ pub(super) fn colour(
         .collect();
     let (mut n, mut sum) = (0, 0.0);
     for (v, mask) in &stretches {
-        super::each_stretch(mask, |from, to| {
-            n += to - from;
-            sum += v[from..to].iter().sum::<f64>();
+        super::each_stretch(v, mask, |values| {
+            n += values.len();
+            sum += values.iter().sum::<f64>();
         });
     }
     let most = colours.most_order().min(n / VALUES_A_COEFFICIENT);
@@ -168,8 +168,11 @@ pub(super) fn colour(
     best.1
 }
 
-/// A stretch less the mean; what does not count is bridged.
+/// A stretch less the mean; what does not count is bridged, unless most values stand alone.
 fn bridged(v: &[f64], mask: &[bool], mean: f64) -> Vec<f64> {
+    if let Some(kept) = super::standing_alone(v, mask) {
+        return kept.iter().map(|v| v - mean).collect();
+    }
     let mut out: Vec<f64> = v
         .iter()
         .zip(mask)
@@ -259,14 +262,14 @@ fn deviance(colour: &Colour, stretches: &[(&[f64], &[bool])], mean: f64) -> f64 
     let mut white = Vec::new();
     let mut centred = Vec::new();
     for (v, mask) in stretches {
-        super::each_stretch(mask, |from, to| {
+        super::each_stretch(v, mask, |values| {
             centred.clear();
-            centred.extend(v[from..to].iter().map(|v| v - mean));
+            centred.extend(values.iter().map(|v| v - mean));
             white.clear();
             colour.whiten(&centred, 1.0, &mut white);
             squares += super::sum_of_squares(&white);
-            count += to - from;
-            determinant += colour.log_determinant(to - from);
+            count += values.len();
+            determinant += colour.log_determinant(values.len());
         });
     }
     count as f64 * (squares / count as f64).max(1e-300).ln() + determinant

@@ -81,20 +81,13 @@ impl Noise {
 
     /// Whitened and scaled series; what does not count is zero.
     pub(crate) fn whiten(&self, series: &Series, mask: &Mask) -> Series {
-        series
-            .iter()
-            .zip(mask)
-            .enumerate()
-            .map(|(s, (column, mask))| {
-                let o = s % self.scale.len();
-                let mut out = Vec::with_capacity(column.len());
-                each_stretch(mask, |from, to| {
-                    out.resize(from, 0.0);
-                    self.colours[o].whiten(&column[from..to], 1.0 / self.scale[o], &mut out);
-                });
-                out.resize(column.len(), 0.0);
-                out
-            })
+        let mut kept = self.whiten_kept(series, mask).into_iter();
+        let mut placed = |counts: &bool| match counts {
+            true => kept.next().unwrap_or(0.0),
+            false => 0.0,
+        };
+        let each = series.iter().zip(mask);
+        each.map(|(_, mask)| mask.iter().map(&mut placed).collect())
             .collect()
     }
 
@@ -103,8 +96,8 @@ impl Noise {
         let mut out = Vec::with_capacity(mask.iter().map(Vec::len).sum());
         for (s, (column, mask)) in series.iter().zip(mask).enumerate() {
             let o = s % self.scale.len();
-            each_stretch(mask, |from, to| {
-                self.colours[o].whiten(&column[from..to], 1.0 / self.scale[o], &mut out);
+            each_stretch(column, mask, |values| {
+                self.colours[o].whiten(values, 1.0 / self.scale[o], &mut out);
             });
         }
         out
@@ -135,9 +128,9 @@ impl Noise {
         for (s, (column, mask)) in residual.iter().zip(mask).enumerate() {
             let o = s % self.scale.len();
             squares.clear();
-            each_stretch(mask, |from, to| {
-                self.colours[o].whiten(&column[from..to], 1.0 / self.scale[o], &mut squares);
-                deviance += self.colours[o].log_determinant(to - from);
+            each_stretch(column, mask, |values| {
+                self.colours[o].whiten(values, 1.0 / self.scale[o], &mut squares);
+                deviance += self.colours[o].log_determinant(values.len());
             });
             for value in &mut squares {
                 *value *= *value;
@@ -175,8 +168,8 @@ impl Noise {
         let outputs = self.scale.len();
         let mut squares = vec![Vec::new(); outputs];
         for (s, (column, mask)) in residual.iter().zip(mask).enumerate() {
-            each_stretch(mask, |from, to| {
-                self.colours[s % outputs].whiten(&column[from..to], 1.0, &mut squares[s % outputs]);
+            each_stretch(column, mask, |values| {
+                self.colours[s % outputs].whiten(values, 1.0, &mut squares[s % outputs]);
             });
         }
         for value in squares.iter_mut().flatten() {
@@ -259,7 +252,7 @@ pub(crate) fn sum_of_squares(values: &[f64]) -> f64 {
 }
 
 /// `sum a b` over as many as the shorter has, in as many partial sums as are made at once.
-fn product(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn product(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
     let (a, b) = (a[..n].chunks_exact(TOGETHER), b[..n].chunks_exact(TOGETHER));
     let last = a.remainder().iter().zip(b.remainder());
@@ -292,8 +285,13 @@ fn sum_of_logarithms(values: &[f64], share: f64) -> f64 {
 /// Values that are summed together: a register of sums each.
 const TOGETHER: usize = 8;
 
-/// Calls `of(from, to)` for each stretch of values that count.
-pub(super) fn each_stretch(mask: &[bool], mut of: impl FnMut(usize, usize)) {
+/// Calls `of` with each stretch of values that count. Where most of them stand alone, as those of every fourth sample do, they
+/// follow each other: a noise model is then one of these values. For irregular times that is an approximation.
+fn each_stretch(column: &[f64], mask: &[bool], mut of: impl FnMut(&[f64])) {
+    if let Some(kept) = standing_alone(column, mask) {
+        of(&kept);
+        return;
+    }
     let mut from = 0;
     // Nearly all count: stretches are taken whole.
     while let Some(skip) = mask[from..].iter().position(|keep| *keep) {
@@ -303,9 +301,20 @@ pub(super) fn each_stretch(mask: &[bool], mut of: impl FnMut(usize, usize)) {
                 .iter()
                 .position(|keep| !keep)
                 .unwrap_or(mask.len() - from);
-        of(from, to);
+        of(&column[from..to]);
         from = to;
     }
+}
+
+/// The values that count, where most of them have no neighbour.
+fn standing_alone(column: &[f64], mask: &[bool]) -> Option<Vec<f64>> {
+    let count = mask.iter().filter(|keep| **keep).count();
+    let followed = mask.windows(2).filter(|w| w[0] && w[1]).count();
+    if count == 0 || 2 * followed >= count || count == mask.len() {
+        return None;
+    }
+    let kept = column.iter().zip(mask).filter(|(_, keep)| **keep);
+    Some(kept.map(|(v, _)| *v).collect())
 }
 
 #[cfg(test)]
@@ -313,6 +322,28 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StudentT};
+
+    #[test]
+    fn values_that_stand_alone_follow_each_other() {
+        let dense: Vec<f64> = (0..300)
+            .map(|k| (f64::from(k) * 0.37).sin() + 0.1)
+            .collect();
+        let mut sparse = vec![9.0; 1200];
+        let mut mask = vec![false; 1200];
+        for (k, v) in dense.iter().enumerate() {
+            sparse[4 * k + 1] = *v;
+            mask[4 * k + 1] = true;
+        }
+        let (every, fourth) = (vec![dense.clone()], vec![sparse]);
+        let (all, some) = (vec![vec![true; 300]], vec![mask]);
+        let noise = Noise::estimate(&every, 1, &all, Colours::All);
+        assert!(noise.colours[0].len() > 0);
+        assert_eq!(noise, Noise::estimate(&fourth, 1, &some, Colours::All));
+        assert_eq!(noise.deviance(&every, &all), noise.deviance(&fourth, &some));
+        let whitened = noise.whiten(&fourth, &some);
+        assert_eq!(whitened[0][1], noise.whiten(&every, &all)[0][0]);
+        assert_eq!(whitened[0][0], 0.0);
+    }
 
     #[test]
     fn products_have_the_logarithm_of_the_sum() {

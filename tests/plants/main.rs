@@ -23,3 +23,4 @@ mod plant_long;
 
 mod plant_parts;
 mod plant_search;
+mod plant_sparse;

@@ -112,12 +112,16 @@ def _known(text: str) -> str:
 
 
 def _figures(measured: Sequence[Array], simulated: Sequence[Array], output: int) -> tuple[float, float]:
-    """Fit in percent and root mean square of the error of an output, over all recordings; means are by recording."""
+    """Fit in percent and root mean square of the error of an output, over all recordings; means are by recording, and of
+    the values that were measured."""
     error = spread = 0.0
-    for y, run in zip(measured, simulated):
-        error += float(np.sum((y[:, output] - run[:, output]) ** 2))
-        spread += float(np.sum((y[:, output] - np.mean(y[:, output])) ** 2))
-    samples = sum(len(y) for y in measured)
+    samples = 0
+    for all_recorded, run in zip(measured, simulated):
+        known = ~np.isnan(all_recorded[:, output])
+        recorded = all_recorded[known, output]
+        error += float(np.sum((recorded - run[known, output]) ** 2))
+        spread += float(np.sum((recorded - np.mean(recorded)) ** 2)) if recorded.size else 0.0
+        samples += recorded.size
     fit = 100.0 * (1.0 - np.sqrt(error / spread)) if spread > 0.0 else np.nan
     return float(fit), float(np.sqrt(error / max(samples, 1)))
 

@@ -25,7 +25,7 @@ pub(crate) struct RoleFlags {
     #[arg(long, value_name = "SECONDS", value_parser = numbers::seconds, allow_negative_numbers = true)]
     dt: Option<f64>,
     /// What to do with missing samples (rows or cells) [default: interpolate up to two in a row, split the recording at longer
-    /// gaps]
+    /// gaps; a plant in equations is compared with the outputs that are there]
     #[arg(long, value_enum, value_name = "HOW")]
     missing: Option<MissingFlag>,
     /// Resample to a uniform grid with this step, without aliasing: for jitter and other rates

@@ -10,7 +10,7 @@ use crate::cli::flags::{RoleFlags, tell_reading};
 use crate::cli::terminal::note;
 use crate::explain::Explanation;
 use crate::identify::{IdentifiedChannel, Recording};
-use crate::log::{Channel, Log, LogError, Reading, RoleNeed, Roles, Source};
+use crate::log::{Channel, Log, LogError, Missing, Reading, RoleNeed, Roles, Source};
 use crate::physics::{
     Hold, Plant, Point, VariableId, diagnose, other_clock, render_all, unknown_units,
 };
@@ -164,7 +164,7 @@ pub(super) fn read_channels(
     need: RoleNeed,
     say: Verbosity,
 ) -> anyhow::Result<(Vec<Log>, Vec<Recording>)> {
-    let roles: Roles = flags.clone().of_model(inputs, outputs)?;
+    let roles = kept_missing(flags.clone().of_model(inputs, outputs)?);
     let need = if inputs.is_empty() {
         RoleNeed::OutputsOnly
     } else {
@@ -181,6 +181,15 @@ pub(super) fn read_channels(
         }
     }
     Ok(read)
+}
+
+/// Equations are compared where something was measured: outputs stay missing, unless it is asked for otherwise.
+pub(crate) fn kept_missing(roles: Roles) -> Roles {
+    let missing = match roles.missing {
+        Missing::Auto => Missing::Keep,
+        asked => asked,
+    };
+    Roles { missing, ..roles }
 }
 
 /// Reads recordings with these columns; one with gaps is several.

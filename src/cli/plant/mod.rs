@@ -8,7 +8,8 @@ mod units_of_logs;
 
 pub(crate) use identify_plant::{HoldFlag, StructureFlags, write_and_tell};
 pub(crate) use load_plant::{
-    all_known, channels, is_plant_file, load, read_recordings, read_with, tell_warnings,
+    all_known, channels, is_plant_file, kept_missing, load, read_recordings, read_with,
+    tell_warnings,
 };
 pub(crate) use show_plant::PlantShowFlags;
 pub(crate) use simulate_plant::{PlantRun, Start};

@@ -58,12 +58,9 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         parameters(&plant, &mut point, text)?;
         tell_out_of_bounds(&plant, &point, say);
     }
-    // Standard input is read once: there, rows without outputs cannot be told apart afterwards.
-    let estimated = matches!(asked.start, Start::Estimate);
-    let again = estimated && asked.input.can_be_reopened();
-    let need = match estimated && !again {
-        true => RoleNeed::Identify,
-        false => RoleNeed::InputsOnly,
+    let need = match asked.start {
+        Start::Estimate => RoleNeed::Identify,
+        _ => RoleNeed::InputsOnly,
     };
     let found = explanation.as_ref().and_then(|e| e.plant.as_ref());
     let mut columns = channels(&plant);
@@ -72,24 +69,17 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         .retain(|i| found.is_none_or(|f| !f.simulated_inputs.contains(&i.channel.name)));
     let remembered = found.and_then(|f| remembered(f, &columns));
     let source = std::slice::from_ref(asked.input);
-    let read = |need: RoleNeed, say: Verbosity| {
-        let of = |names: &Channels| {
-            read_channels(&plant, (&columns, names), source, asked.roles, need, say)
-        };
-        let by_plant = of(&columns);
-        match (&remembered, by_plant) {
-            (Some(names), Err(error))
-                if error.is::<OtherNames>() && !asked.roles.names_columns() =>
-            {
-                of(names).map_err(|other| match other.is::<OtherNames>() {
-                    true => error,
-                    false => other,
-                })
-            }
-            (_, by_plant) => by_plant,
+    let of =
+        |names: &Channels| read_channels(&plant, (&columns, names), source, asked.roles, need, say);
+    let (mut logs, _) = match (&remembered, of(&columns)) {
+        (Some(names), Err(error)) if error.is::<OtherNames>() && !asked.roles.names_columns() => {
+            of(names).map_err(|other| match other.is::<OtherNames>() {
+                true => error,
+                false => other,
+            })
         }
-    };
-    let (mut logs, _) = read(need, say)?;
+        (_, by_plant) => by_plant,
+    }?;
     if logs.len() != 1 {
         anyhow::bail!(
             "{}: samples are missing in the middle; a simulation needs one without gaps (--missing interpolate)",
@@ -149,13 +139,8 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
                 least_squares: true,
             };
             let at_values = plant.with_values(&point.parameters);
-            let mut recording = PlantRecording::from(&log);
-            if again && !columns.0.is_empty() {
-                let quiet = Verbosity { quiet: true, ..say };
-                let (parts, _) = read(RoleNeed::Identify, quiet)?;
-                recording.outputs = where_known(&log, &parts);
-                tell_missing(&log, &recording, say);
-            }
+            let recording = PlantRecording::from(&log);
+            tell_missing(&log, &recording, say);
             let found = estimate(&at_values, &[recording], &options)?;
             point.start = found.points[0].start.clone();
         }
@@ -191,26 +176,6 @@ fn remembered(found: &AugmentedPlant, columns: &Channels) -> Option<Channels> {
     let names = (inputs, of(&found.outputs));
     let fits = names.0.len() == columns.0.len() && names.1.len() == columns.1.len();
     (fits && names != *columns).then_some(names)
-}
-
-/// Outputs of the parts of a recording on the samples of `log`; NaN where there are none.
-fn where_known(log: &Log, parts: &[Log]) -> Vec<Vec<f64>> {
-    let outputs = parts.first().map_or(0, |part| part.output_data.len());
-    let mut all = vec![vec![f64::NAN; log.samples()]; outputs];
-    for part in parts {
-        let first = ((part.start_time - log.start_time) / log.sample_time).round();
-        for (y, known) in all.iter_mut().zip(&part.output_data) {
-            for (k, value) in known.iter().enumerate() {
-                let at = first + k as f64;
-                if at >= 0.0
-                    && let Some(y) = y.get_mut(at as usize)
-                {
-                    *y = *value;
-                }
-            }
-        }
-    }
-    all
 }
 
 /// Says how many samples the initial state is estimated from, where that is not all.

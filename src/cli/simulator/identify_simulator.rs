@@ -9,7 +9,7 @@ use clap::Args;
 use super::simulator_command::SimulatorCommand;
 use super::simulator_parameters;
 use crate::cli::flags::{RoleFlags, numbers};
-use crate::cli::plant::{StructureFlags, read_with, write_and_tell};
+use crate::cli::plant::{StructureFlags, kept_missing, read_with, write_and_tell};
 use crate::cli::terminal::{Output, Progress, check_distinct, note, paths};
 use crate::cli::{Outcome, Verbosity};
 use crate::log::{Channel, Log, RoleNeed, Source, check_same_sampling};
@@ -85,7 +85,8 @@ pub(crate) fn run(
     read.push(file);
     let output = output.map(|o| Output::check(o, &read)).transpose()?;
     let parameters = simulator_parameters::read(file)?;
-    let (logs, recordings) = read_with(&roles.clone().roles(), logs, RoleNeed::Identify, say)?;
+    let roles = kept_missing(roles.clone().roles());
+    let (logs, recordings) = read_with(&roles, logs, RoleNeed::Identify, say)?;
     let first = logs
         .first()
         .ok_or_else(|| anyhow::anyhow!("there is no recording"))?;

@@ -121,17 +121,22 @@ pub(super) fn free_run_error(
     error.is_finite().then_some(error)
 }
 
-/// Samples of a recording that a fold leaves out.
-fn block(samples: usize, fold: usize) -> std::ops::Range<usize> {
-    samples * fold / BLOCKS..samples * (fold + 1) / BLOCKS
+/// Samples of a recording that a fold leaves out: as many measured ones as any other.
+fn block(recording: &PlantRecording, fold: usize) -> std::ops::Range<usize> {
+    let values = recording.measured().len();
+    let begin = |fold| match fold {
+        BLOCKS => recording.samples(),
+        _ => recording.before_measured(values * fold / BLOCKS),
+    };
+    begin(fold)..begin(fold + 1)
 }
 
 /// Samples that a fold leaves out of recording `r`: a block of each, or of several recordings whole ones. A step response says
 /// little without its beginning.
-fn left_out(recordings: usize, r: usize, samples: usize, fold: usize) -> std::ops::Range<usize> {
-    match (recordings >= BLOCKS, r % BLOCKS == fold) {
-        (false, _) => block(samples, fold),
-        (true, true) => 0..samples,
+fn left_out(recordings: &[PlantRecording], r: usize, fold: usize) -> std::ops::Range<usize> {
+    match (recordings.len() >= BLOCKS, r % BLOCKS == fold) {
+        (false, _) => block(&recordings[r], fold),
+        (true, true) => 0..recordings[r].samples(),
         (true, false) => 0..0,
     }
 }
@@ -142,10 +147,9 @@ pub(crate) fn blocks(recordings: &[PlantRecording]) -> Vec<[f64; 2]> {
         [first, others @ ..] if others.len() + 1 < BLOCKS => first,
         _ => return vec![],
     };
-    let samples = recording.outputs.first().map_or(0, Vec::len);
     let at = |k: usize| recording.start_time + k as f64 * recording.sample_time;
     (0..BLOCKS)
-        .map(|fold| block(samples, fold))
+        .map(|fold| block(recording, fold))
         .map(|b| [at(b.start), at(b.end)])
         .collect()
 }
@@ -226,9 +230,8 @@ pub(super) fn held_out(
             let (mut kept, mut kept_start) = (Vec::new(), Vec::new());
             let (mut test, mut test_start) = (Vec::new(), Vec::new());
             for (r, recording) in recordings.iter().enumerate() {
-                let samples = recording.outputs.first()?.len();
-                let out = left_out(recordings.len(), r, samples, fold);
-                for range in [0..out.start, out.end..samples] {
+                let out = left_out(recordings, r, fold);
+                for range in [0..out.start, out.end..recording.samples()] {
                     if !range.is_empty() {
                         kept_start.extend(at(r, range.start));
                         kept.push(cut(recording, range));
@@ -258,7 +261,13 @@ pub(super) fn held_out(
             let of_states = only_states(&fitted, hold);
             let study = Study::new(&fitted, &test, &of_states).ok()?;
             let run = study.least_squares_with(&test_start, AGAIN)?;
-            study.residual(&run)
+            // What was not measured has no error.
+            let mut residual = study.residual(&run)?;
+            for (e, measured) in residual.iter_mut().zip(study.mask()) {
+                let each = e.iter_mut().zip(measured).filter(|(_, m)| !**m);
+                each.for_each(|(e, _)| *e = f64::NAN);
+            }
+            Some(residual)
         })
         .collect();
     let folds = folds?;
@@ -297,11 +306,33 @@ mod tests {
 
     #[test]
     fn of_several_recordings_whole_ones_are_left_out() {
+        let all = vec![of(&[1.0; 90]); 4];
         let folds = |recordings: usize| -> Vec<Vec<usize>> {
-            let each = |fold| (0..recordings).map(move |r| left_out(recordings, r, 90, fold).len());
+            let some = &all[..recordings];
+            let each = |fold| (0..recordings).map(move |r| left_out(some, r, fold).len());
             (0..BLOCKS).map(|fold| each(fold).collect()).collect()
         };
         assert_eq!(folds(2), [[30, 30], [30, 30], [30, 30]]);
         assert_eq!(folds(4), [[90, 0, 0, 90], [0, 90, 0, 0], [0, 0, 90, 0]]);
+    }
+
+    #[test]
+    fn blocks_have_as_many_measured_values() {
+        let mut y = vec![f64::NAN; 100];
+        for k in [1, 2, 3, 5, 9, 95] {
+            y[k] = 1.0;
+        }
+        let ends = |fold| block(&of(&y), fold);
+        assert_eq!([ends(0), ends(1), ends(2)], [0..3, 3..9, 9..100]);
+        assert_eq!(of(&y).first_part(2.0 / 3.0), 9);
+    }
+
+    fn of(y: &[f64]) -> PlantRecording {
+        PlantRecording {
+            inputs: vec![],
+            outputs: vec![y.to_vec()],
+            sample_time: 1.0,
+            start_time: 0.0,
+        }
     }
 }

@@ -20,22 +20,26 @@ pub(crate) struct Filled {
 pub(crate) struct Tally {
     /// Values interpolated, a count a channel.
     pub(crate) interpolated: Vec<usize>,
+    /// Values that stay missing.
+    pub(crate) kept: Vec<usize>,
     /// Longest run of them.
     pub(crate) longest: usize,
     /// Samples left out because a value was missing there or because they stood alone.
     pub(crate) left_out: usize,
 }
 
-/// The rows of a piece on its grid, in parts without missing values. `columns` are those of the table, NaN where a value is
-/// missing.
+/// The rows of a piece on its grid, in parts without missing values; those of outputs may be kept. `columns` are those of the
+/// table, the first `inputs` of them inputs, NaN where a value is missing.
 pub(crate) fn fill(
     piece: &Piece,
     columns: &[Vec<f64>],
+    inputs: usize,
     policy: Missing,
     tally: &mut Tally,
 ) -> Vec<Filled> {
     let samples = piece.samples.last().map_or(0, |last| last + 1);
     tally.interpolated.resize(columns.len(), 0);
+    tally.kept.resize(columns.len(), 0);
     let mut gridded: Vec<Vec<f64>> = columns
         .iter()
         .map(|column| {
@@ -49,18 +53,30 @@ pub(crate) fn fill(
         })
         .collect();
     let most = match policy {
-        Missing::Auto => BRIDGED,
+        Missing::Auto | Missing::Keep => BRIDGED,
         Missing::Split | Missing::Error => 0,
         Missing::Interpolate => usize::MAX,
     };
-    for (column, count) in gridded.iter_mut().zip(&mut tally.interpolated) {
+    let required = match policy {
+        Missing::Keep => inputs,
+        _ => columns.len(),
+    };
+    for (column, count) in gridded
+        .iter_mut()
+        .zip(&mut tally.interpolated)
+        .take(required)
+    {
         let (filled, longest) = bridge(column, most);
         *count += filled;
         tally.longest = tally.longest.max(longest);
     }
+    for (column, count) in gridded.iter().zip(&mut tally.kept).skip(required) {
+        *count += column.iter().filter(|v| !v.is_finite()).count();
+    }
     let whole = |k: usize| {
         gridded
             .iter()
+            .take(required)
             .all(|column| column.get(k).is_some_and(|v| v.is_finite()))
     };
     let mut parts = Vec::new();
@@ -132,7 +148,7 @@ mod tests {
             column[at] = GONE;
         }
         let mut tally = Tally::default();
-        let parts = fill(&piece(100), &[column.clone()], Missing::Auto, &mut tally);
+        let parts = fill(&piece(100), &[column.clone()], 0, Missing::Auto, &mut tally);
         assert_eq!(
             (tally.interpolated.clone(), tally.longest, tally.left_out),
             (vec![3], 2, 5)
@@ -156,16 +172,30 @@ mod tests {
         let parts = fill(
             &piece(100),
             &[column.clone()],
+            0,
             Missing::Interpolate,
             &mut tally,
         );
         assert_eq!((parts.len(), tally.longest, tally.left_out), (1, 3, 2));
         let parts = fill(
             &piece(100),
-            &[column],
+            &[column.clone()],
+            0,
             Missing::Split,
             &mut Tally::default(),
         );
         assert_eq!(parts.iter().map(|p| p.from).collect::<Vec<_>>(), [22, 53]);
+        // Outputs that are kept do not cut; inputs do.
+        let mut tally = Tally::default();
+        let columns = [column.clone(), column];
+        let parts = fill(&piece(100), &columns[1..], 0, Missing::Keep, &mut tally);
+        assert_eq!((parts.len(), tally.kept, tally.left_out), (1, vec![8], 0));
+        assert!(parts[0].columns[0][50].is_nan());
+        let mut tally = Tally::default();
+        let parts = fill(&piece(100), &columns, 1, Missing::Keep, &mut tally);
+        assert_eq!(
+            (parts.len(), tally.interpolated, tally.kept),
+            (2, vec![3, 0], vec![0, 8])
+        );
     }
 }

@@ -27,18 +27,40 @@ pub(crate) struct Resampling<'a> {
 impl Resampling<'_> {
     /// The values of a channel on the grid; `held` for an input.
     pub(crate) fn column(&self, values: &[f64], held: bool) -> Vec<f64> {
-        let last = ((self.to - self.from) / self.wanted + 1e-6)
-            .floor()
-            .max(0.0) as usize;
-        let grid = (0..=last).map(|k| self.from + k as f64 * self.wanted);
         if self.wanted > self.step * (1.0 + 1e-6) {
-            self.filtered(values, grid)
+            self.filtered(values)
         } else {
-            self.joined(values, grid, held)
+            self.joined(values, held)
         }
     }
 
-    fn filtered(&self, values: &[f64], grid: impl Iterator<Item = f64>) -> Vec<f64> {
+    /// The values of a channel at the points that are nearest to their times, the mean of those that share one; NaN elsewhere.
+    pub(crate) fn placed(&self, values: &[f64]) -> Vec<f64> {
+        let mut sums = vec![(0.0, 0.0); self.last() + 1];
+        for (time, value) in self.times.iter().zip(values) {
+            let at = ((time - self.from) / self.wanted).round();
+            if at >= 0.0
+                && let Some((sum, count)) = sums.get_mut(at as usize)
+            {
+                *sum += value;
+                *count += 1.0;
+            }
+        }
+        sums.into_iter().map(|(sum, count)| sum / count).collect()
+    }
+
+    /// Number of the last point.
+    fn last(&self) -> usize {
+        ((self.to - self.from) / self.wanted + 1e-6)
+            .floor()
+            .max(0.0) as usize
+    }
+
+    fn grid(&self) -> impl Iterator<Item = f64> {
+        (0..=self.last()).map(|k| self.from + k as f64 * self.wanted)
+    }
+
+    fn filtered(&self, values: &[f64]) -> Vec<f64> {
         let reach = HALF_WIDTH * self.wanted;
         let stands_for: Vec<f64> = (0..self.times.len())
             .map(|k| {
@@ -53,49 +75,53 @@ impl Resampling<'_> {
             })
             .collect();
         let mut from = 0;
-        grid.map(|now| {
-            while self.times.get(from).is_some_and(|t| *t < now - reach) {
-                from += 1;
-            }
-            let (mut sum, mut weights) = (0.0, 0.0);
-            let around = self.times.iter().zip(values).zip(&stands_for).skip(from);
-            for ((time, value), share) in around.take_while(|((time, _), _)| **time <= now + reach)
-            {
-                let weight = share * kernel((time - now) / self.wanted);
-                sum += weight * value;
-                weights += weight;
-            }
-            sum / weights
-        })
-        .collect()
+        self.grid()
+            .map(|now| {
+                while self.times.get(from).is_some_and(|t| *t < now - reach) {
+                    from += 1;
+                }
+                let (mut sum, mut weights) = (0.0, 0.0);
+                let around = self.times.iter().zip(values).zip(&stands_for).skip(from);
+                for ((time, value), share) in
+                    around.take_while(|((time, _), _)| **time <= now + reach)
+                {
+                    let weight = share * kernel((time - now) / self.wanted);
+                    sum += weight * value;
+                    weights += weight;
+                }
+                sum / weights
+            })
+            .collect()
     }
 
-    fn joined(&self, values: &[f64], grid: impl Iterator<Item = f64>, held: bool) -> Vec<f64> {
+    /// The values of a channel on the grid, held or joined by straight lines.
+    pub(crate) fn joined(&self, values: &[f64], held: bool) -> Vec<f64> {
         let mut at = 0;
-        grid.map(|now| {
-            while self
-                .times
-                .get(at + 1)
-                .is_some_and(|t| *t <= now + 1e-9 * self.wanted)
-            {
-                at += 1;
-            }
-            let here = values.get(at).copied().unwrap_or(f64::NAN);
-            let (Some(start), Some(end), Some(next)) = (
-                self.times.get(at),
-                self.times.get(at + 1),
-                values.get(at + 1),
-            ) else {
-                return here;
-            };
-            let share = ((now - start) / (end - start)).clamp(0.0, 1.0);
-            if held {
-                here
-            } else {
-                here + share * (next - here)
-            }
-        })
-        .collect()
+        self.grid()
+            .map(|now| {
+                while self
+                    .times
+                    .get(at + 1)
+                    .is_some_and(|t| *t <= now + 1e-9 * self.wanted)
+                {
+                    at += 1;
+                }
+                let here = values.get(at).copied().unwrap_or(f64::NAN);
+                let (Some(start), Some(end), Some(next)) = (
+                    self.times.get(at),
+                    self.times.get(at + 1),
+                    values.get(at + 1),
+                ) else {
+                    return here;
+                };
+                let share = ((now - start) / (end - start)).clamp(0.0, 1.0);
+                if held {
+                    here
+                } else {
+                    here + share * (next - here)
+                }
+            })
+            .collect()
     }
 }
 
@@ -166,5 +192,8 @@ mod tests {
             to.column(&[1.0, 3.0, 5.0], false),
             [1.0, 2.0, 3.0, 4.0, 5.0]
         );
+        let places = to.placed(&[1.0, 3.0, 5.0]);
+        assert_eq!((places[0], places[2], places[4]), (1.0, 3.0, 5.0));
+        assert!(places[1].is_nan() && places[3].is_nan());
     }
 }

@@ -105,7 +105,7 @@ pub(crate) fn lay(
         });
     }
     let bridged = |policy: Missing| match policy {
-        Missing::Auto => BRIDGED,
+        Missing::Auto | Missing::Keep => BRIDGED,
         Missing::Split | Missing::Error => 0,
         Missing::Interpolate => usize::MAX,
     };

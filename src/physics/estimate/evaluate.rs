@@ -12,7 +12,7 @@ use super::adequacy::{self, Question, ResidualTest};
 use super::deviance::{Deviance, invert};
 use super::optimise::{Range, minimise};
 use super::problem::Problem;
-use super::{EstimateError, EstimateOptions, Form, PlantRecording, ROUND};
+use super::{EstimateError, EstimateOptions, Form, PlantRecording, ROUND, kept};
 use crate::noise::{Colour, Colours, Noise};
 use crate::physics::simulation::{Hold, Plant, Point};
 
@@ -209,7 +209,7 @@ fn search(problem: &Problem, form: Form, point: &mut Vec<f64>, ranges: &[Range])
         .max()?;
     let mut samples = FIRST_SAMPLES.max(FIRST_SAMPLES_A_STATE * problem.states());
     loop {
-        let parts = problem.parts(|all| all.min(samples));
+        let parts = problem.parts(|r| r.before_measured(samples));
         let part = problem.with_recordings(&parts);
         let mut objective = Deviance::new(&part, form, Noise::unit(problem.outputs()));
         for _ in 0..2 {
@@ -316,12 +316,13 @@ impl Left {
         let mut tests = Vec::new();
         for output in 0..l {
             let places = (output..self.first.len() - 1).step_by(l);
-            let series: Vec<&[f64]> = match raw {
-                Some(raw) => places.map(|s| raw[s].as_slice()).collect(),
+            let series: Vec<Vec<f64>> = match raw {
+                Some(raw) => places.map(|s| kept(&raw[s], &problem.mask[s])).collect(),
                 None => places
-                    .map(|s| &self.residual.as_slice()[self.first[s]..self.first[s + 1]])
+                    .map(|s| self.residual.as_slice()[self.first[s]..self.first[s + 1]].to_vec())
                     .collect(),
             };
+            let series: Vec<&[f64]> = series.iter().map(Vec::as_slice).collect();
             let fitted = if fitted {
                 noise.colours[output].len()
             } else {

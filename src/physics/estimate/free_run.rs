@@ -131,7 +131,7 @@ pub(super) fn fit_free_run(problem: &Problem) -> Option<Fit> {
         }
     }
     // Draws are compared on the first part of the recordings.
-    let recordings = problem.parts(|samples| samples.min(GLANCED_SAMPLES));
+    let recordings = problem.parts(|r| r.before_measured(GLANCED_SAMPLES));
     let short = problem.with_recordings(&recordings);
     let draws = (GLANCED_VALUES / short.count().max(1)).clamp(LEAST_DRAWS, MOST_DRAWS);
     let (draws, glance) = if problem.plant.costly() {
@@ -169,7 +169,7 @@ fn grown_fit(problem: &Problem) -> Option<(f64, Vec<f64>)> {
     let mut point = problem.nominal();
     let mut part = GROWN_FROM;
     while part < 1.0 {
-        let recordings = problem.parts(|samples| (part * samples as f64) as usize);
+        let recordings = problem.parts(|r| r.first_part(part));
         let short = problem.with_recordings(&recordings);
         if short.count() > 2 * point.len() {
             white_fit(&short, &mut point, CONTINUED)?;

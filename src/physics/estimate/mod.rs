@@ -130,7 +130,7 @@ const ROUND: Effort = Effort {
 };
 /// A criterion that is larger than that of a rival by this is not improved further.
 const HOPELESS: f64 = 200.0;
-/// Part of each recording that the held-out fit is estimated from; the rest is judged.
+/// Part of what was measured in each recording that the held-out fit is estimated from; the rest is judged.
 pub const HELD_OUT_FROM: f64 = 2.0 / 3.0;
 
 /// Estimates a plant, in equations or as an external simulator, from recordings of it. External simulators have no states that
@@ -226,7 +226,7 @@ fn promising_innovation(problem: &Problem, free_run: Option<&Fit>) -> Option<Fit
     let Some(free_run) = free_run else {
         return observer::fit(problem, None);
     };
-    let recordings = problem.parts(|samples| samples.min(GLANCED_SAMPLES));
+    let recordings = problem.parts(|r| r.before_measured(GLANCED_SAMPLES));
     let short = problem.with_recordings(&recordings);
     let first = observer::fit(&short, Some(&free_run.point))?;
     let residual =
@@ -303,8 +303,7 @@ fn finish(problem: &Problem, fit: Fit, other_criterion: Option<f64>) -> PlantEst
 
 /// Free run over the whole recordings of a fit to their first part, in the same form, from the fit to all.
 fn held_out(problem: &Problem, fit: &Fit) -> Option<Vec<Vec<f64>>> {
-    let part = |samples: usize| (HELD_OUT_FROM * samples as f64) as usize;
-    let recordings = problem.parts(part);
+    let recordings = problem.parts(|r| r.first_part(HELD_OUT_FROM));
     let short = problem.with_recordings(&recordings);
     let numbers = problem.nominal().len();
     if short.count() <= 2 * fit.point.len() {
@@ -315,6 +314,12 @@ fn held_out(problem: &Problem, fit: &Fit) -> Option<Vec<Vec<f64>>> {
         Form::Innovation => observer::fit(&short, Some(&fit.point[..numbers]))?,
     };
     Deviance::new(problem, Form::FreeRun, again.noise).simulated(&again.point[..numbers])
+}
+
+/// Values that count, one after the other.
+fn kept(series: &[f64], mask: &[bool]) -> Vec<f64> {
+    let kept = series.iter().zip(mask).filter(|(_, keep)| **keep);
+    kept.map(|(e, _)| *e).collect()
 }
 
 /// Tests of the residuals: are they white, and no function of the inputs? What the parameters could do is taken out of neither
@@ -328,15 +333,13 @@ fn residual_tests(
     let l = problem.outputs();
     let mut tests = Vec::new();
     for output in 0..l {
-        let series: Vec<&[f64]> = innovations
-            .iter()
+        let of_output = (innovations.iter().zip(&problem.mask))
             .skip(output)
-            .step_by(l)
-            .map(Vec::as_slice)
-            .collect();
+            .step_by(l);
+        let series: Vec<Vec<f64>> = of_output.map(|(e, mask)| kept(e, mask)).collect();
         tests.extend(adequacy::white(
             output,
-            &series,
+            &series.iter().map(Vec::as_slice).collect::<Vec<_>>(),
             fit.noise.colours[output].len(),
         ));
         let (mut residuals, mut inputs, mut products) =
@@ -353,13 +356,7 @@ fn residual_tests(
                 to.resize(columns.len().max(to.len()), Vec::new());
                 to.iter_mut().zip(columns).for_each(|(to, c)| to.extend(c));
             };
-            residuals.extend(
-                series[r]
-                    .iter()
-                    .zip(mask)
-                    .filter(|(_, keep)| **keep)
-                    .map(|(e, _)| *e),
-            );
+            residuals.extend(&series[r]);
             append(
                 &mut inputs,
                 whitened(

@@ -152,6 +152,26 @@ impl PlantRecording {
         self.outputs.first().map_or(0, Vec::len)
     }
 
+    /// Samples at which an output was measured.
+    pub(crate) fn measured(&self) -> Vec<usize> {
+        let known = |k: &usize| self.outputs.iter().any(|y| y[*k].is_finite());
+        (0..self.samples()).filter(known).collect()
+    }
+
+    /// The samples before the measured one with this number; all where there are not so many.
+    pub(crate) fn before_measured(&self, number: usize) -> usize {
+        match number {
+            0 => 0,
+            _ => (self.measured().get(number).copied()).unwrap_or(self.samples()),
+        }
+    }
+
+    /// The samples of this part of what was measured.
+    pub(crate) fn first_part(&self, part: f64) -> usize {
+        let values = self.measured().len() as f64;
+        self.before_measured((part * values) as usize)
+    }
+
     /// Outputs of a plant that runs freely over the recording.
     pub(crate) fn run(
         &self,
@@ -244,18 +264,17 @@ impl<'a> Problem<'a> {
         Ok(problem)
     }
 
-    /// The first samples of each recording: as many as `count` makes of its length.
-    pub(crate) fn parts(&self, count: impl Fn(usize) -> usize) -> Vec<PlantRecording> {
-        let cut = |columns: &[Vec<f64>]| {
-            columns
-                .iter()
-                .map(|c| c[..count(c.len()).clamp(1.min(c.len()), c.len())].to_vec())
-                .collect()
-        };
-        let part = |r: &PlantRecording| PlantRecording {
-            inputs: cut(&r.inputs),
-            outputs: cut(&r.outputs),
-            ..*r
+    /// The first samples of each recording, so many as `count` says.
+    pub(crate) fn parts(&self, count: impl Fn(&PlantRecording) -> usize) -> Vec<PlantRecording> {
+        let part = |r: &PlantRecording| {
+            let samples = count(r).clamp(1.min(r.samples()), r.samples());
+            let cut =
+                |columns: &[Vec<f64>]| columns.iter().map(|c| c[..samples].to_vec()).collect();
+            PlantRecording {
+                inputs: cut(&r.inputs),
+                outputs: cut(&r.outputs),
+                ..*r
+            }
         };
         self.recordings.iter().map(part).collect()
     }

@@ -6,14 +6,17 @@ use crate::log::Log;
 use crate::physics::estimate::{HELD_OUT_FROM, PlantEstimate, PlantRecording};
 use crate::physics::{Excitation, Hold, Simulated};
 
-/// `100 (1 - |y - s| / |y - mean y|)` over several recordings, and the root mean square of the error.
+/// `100 (1 - |y - s| / |y - mean y|)` over several recordings, and the root mean square of the error; values that were not
+/// measured, NaN, are left out.
 fn fit(pairs: &[(&[f64], &[f64])]) -> (f64, f64) {
     let (mut error, mut spread, mut count) = (0.0, 0.0, 0.0);
     for (y, s) in pairs {
-        let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
-        error += y.iter().zip(*s).map(|(y, s)| (y - s).powi(2)).sum::<f64>();
-        spread += y.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
-        count += y.len() as f64;
+        let known = || y.iter().zip(*s).filter(|(y, _)| y.is_finite());
+        let values = known().count() as f64;
+        let mean = known().map(|(y, _)| y).sum::<f64>() / values.max(1.0);
+        error += known().map(|(y, s)| (y - s).powi(2)).sum::<f64>();
+        spread += known().map(|(y, _)| (y - mean).powi(2)).sum::<f64>();
+        count += values;
     }
     (
         100.0 * (1.0 - (error / spread).sqrt()),
@@ -68,8 +71,11 @@ pub fn plant_fits(
                 .as_ref()
                 .map(|(_, runs)| runs.iter().map(|r| r[o].as_slice()));
             let rest = |runs: &[Vec<f64>]| {
-                let pairs = measured(o).zip(runs.iter().skip(o).step_by(l));
-                let later = pairs.map(|(y, s)| (last_part(y), last_part(s)));
+                let runs = runs.iter().skip(o).step_by(l);
+                let later = records.iter().zip(runs).map(|(r, s)| {
+                    let from = r.first_part(HELD_OUT_FROM);
+                    (&r.outputs[o][from..], &s[from..])
+                });
                 fit(&later.collect::<Vec<_>>()).0
             };
             FitDocument {
@@ -86,13 +92,9 @@ pub fn plant_fits(
         .collect()
 }
 
-/// What the held-out fit is judged on.
-fn last_part(series: &[f64]) -> &[f64] {
-    &series[(HELD_OUT_FROM * series.len() as f64) as usize..]
-}
-
-/// Order and free runs of the linear model that is identified from the same recordings.
+/// Order and free runs of the linear model that is identified from the same recordings; none where outputs are missing.
 fn linear_model(logs: &[Log]) -> Option<(usize, Vec<Vec<Vec<f64>>>)> {
+    logs.iter().try_for_each(Log::check).ok()?;
     let model = identify(logs, &Options::default()).ok()?;
     let runs: Option<Vec<_>> = logs
         .iter()

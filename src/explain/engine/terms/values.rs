@@ -41,11 +41,25 @@ pub(in crate::explain::engine) fn starts(
             .iter()
             .map(|p| begin + p * samples as f64 * h)
             .collect(),
-        Starts::Samples(counts) => counts.iter().map(|c| c * h).collect(),
+        Starts::Samples(counts) => {
+            let measured = spacing(recordings);
+            counts.iter().map(|c| c * measured).collect()
+        }
         Starts::Moved(counts) => of(counts, &|a, n| n * a.spread() * h),
         Starts::Values(values) | Starts::Share(values) => values.to_vec(),
         Starts::Peaks => peaks.to_vec(),
     }
+}
+
+/// Mean time between values of the first output: the sample time, unless some are missing.
+fn spacing(recordings: &[PlantRecording]) -> f64 {
+    let (mut time, mut values) = (0.0, 0.0);
+    for r in recordings {
+        time += r.samples() as f64 * r.sample_time;
+        let measured = r.outputs[0].iter().filter(|y| y.is_finite());
+        values += measured.count() as f64;
+    }
+    time / f64::max(values, 1.0)
 }
 
 /// The combinations of start values of all shapes; `peaks` are frequencies in rad/s.
