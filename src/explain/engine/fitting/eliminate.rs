@@ -42,7 +42,13 @@ pub(in crate::explain::engine) fn alone(
     let place = same_place(second.lead.place, &first.candidate.plant.spec, spec)?;
     let mut arguments = arguments(spec);
     let hooked = hooked(spec, spec, &arguments)?;
-    path(study, baseline, &hooked, recordings, &mut arguments)?;
+    path(
+        study,
+        (baseline, baseline),
+        &hooked,
+        recordings,
+        &mut arguments,
+    )?;
     let argument = match second.lead.argument {
         Some(_) => Some(
             arguments

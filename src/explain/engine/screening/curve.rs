@@ -3,12 +3,13 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::explain::engine::fitting::edit::{Place, literal};
-use crate::explain::engine::screening::path::{Hooked, Path};
+use crate::explain::engine::screening::path::{Hooked, Path, TOGETHER};
 use crate::explain::engine::screening::projection::Projection;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::{Argument, ArgumentForm};
 use crate::explain::engine::terms::library::CURVE;
 use crate::explain::engine::terms::term::Port;
+use crate::noise::Series;
 
 /// Knots of a curve: half of them at quantiles, half at equal distances.
 const KNOTS: usize = 9;
@@ -89,8 +90,7 @@ pub(in crate::explain::engine) fn curves(
     hooked: &Hooked,
     path: &Path,
     projection: &Projection,
-    gain: Option<&DMatrix<f64>>,
-    whiten: &(dyn Fn(&crate::noise::Series) -> Vec<f64> + Sync),
+    whiten: &(dyn Fn(&Series) -> Vec<f64> + Sync),
 ) -> Vec<Lead> {
     let at_port = |port: Port| {
         let mut pairs: Vec<(Place, usize)> = Vec::new();
@@ -113,15 +113,21 @@ pub(in crate::explain::engine) fn curves(
         let argument = &arguments[at];
         let hook = hooked.places.iter().position(|p| *p == place)?;
         let knots = knots(argument);
-        let (columns, products): (Vec<Vec<f64>>, Vec<DVector<f64>>) = (0..knots.len())
+        let signals: Vec<Series> = (0..knots.len())
             .map(|i| {
-                let signal: Vec<Vec<f64>> = argument
-                    .values
-                    .iter()
-                    .map(|values| values.iter().map(|&z| piece(&knots, i, z)).collect())
-                    .collect();
-                let held = argument.held;
-                let mut column = whiten(&path.propagate(hooked.columns[hook], &signal, held, gain));
+                let of = |values: &Vec<f64>| values.iter().map(|&z| piece(&knots, i, z)).collect();
+                argument.values.iter().map(of).collect()
+            })
+            .collect();
+        let (columns, products): (Vec<Vec<f64>>, Vec<DVector<f64>>) = signals
+            .chunks(TOGETHER)
+            .flat_map(|signals| {
+                let held = |signal| (signal, argument.held);
+                let entering: Vec<(&Series, bool)> = signals.iter().map(held).collect();
+                path.propagate(hooked.columns[hook], &entering)
+            })
+            .map(|series| {
+                let mut column = whiten(&series);
                 let products = projection.off(&mut column);
                 (column, products)
             })

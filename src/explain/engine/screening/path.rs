@@ -7,15 +7,111 @@ use crate::explain::engine::fitting::edit::{Edit, Place, places};
 use crate::explain::engine::terms::argument::Argument;
 use crate::noise::Series;
 use crate::physics::estimate::{Fit, PlantRecording, Study};
-use crate::physics::{ModelSpec, Plant};
+use crate::physics::{LinearPlant, ModelSpec, Plant};
 
-/// The plant along its predictions.
-pub(in crate::explain::engine) struct Path {
-    /// From sample to sample, for each recording.
-    phi: Vec<Vec<DMatrix<f64>>>,
-    gamma: Vec<Vec<DMatrix<f64>>>,
-    c: Vec<Vec<DMatrix<f64>>>,
-    d: Vec<Vec<DMatrix<f64>>>,
+/// Signals that are propagated together.
+pub(in crate::explain::engine) const TOGETHER: usize = 4;
+/// A number for each of them.
+type Lanes = [f64; TOGETHER];
+
+/// The plant along its predictions, for each recording.
+pub(in crate::explain::engine) struct Path(Vec<Steps>);
+
+/// The plant from sample to sample of a recording. Matrices are stored by rows, one sample after the other.
+struct Steps {
+    states: usize,
+    outputs: usize,
+    phi: Vec<f64>,
+    c: Vec<f64>,
+    of_input: Vec<OfInput>,
+}
+
+/// What one input does.
+struct OfInput {
+    /// To the next states, and to the outputs.
+    gamma: Vec<f64>,
+    d: Vec<f64>,
+    /// To the next states through an observer; empty where there is none.
+    observed: Vec<f64>,
+}
+
+impl Steps {
+    /// Of discrete systems with the gain of an observer, which corrects by what was measured.
+    fn new(
+        plants: &[LinearPlant],
+        (discrete, l): (&[(DMatrix<f64>, DMatrix<f64>)], usize),
+        gain: Option<&DMatrix<f64>>,
+        recording: &PlantRecording,
+    ) -> Self {
+        let n = discrete.first().map_or(0, |(phi, _)| phi.nrows());
+        let inputs = discrete.first().map_or(0, |(_, gamma)| gamma.ncols());
+        let empty = || OfInput {
+            gamma: vec![],
+            d: vec![],
+            observed: vec![],
+        };
+        let mut steps = Self {
+            states: n,
+            outputs: l,
+            phi: vec![],
+            c: vec![],
+            of_input: (0..inputs).map(|_| empty()).collect(),
+        };
+        for (k, (plant, (phi, gamma))) in plants.iter().zip(discrete).enumerate() {
+            let (c, d) = (plant.c.rows(0, l), plant.d.rows(0, l));
+            let corrected = gain.map(|gain| {
+                let measured = |o: usize| recording.outputs[o][k].is_finite();
+                let at = |i, o| if measured(o) { gain[(i, o)] } else { 0.0 };
+                phi * DMatrix::from_fn(n, l, at)
+            });
+            let phi = match &corrected {
+                Some(corrected) => phi - corrected * c,
+                None => phi.clone(),
+            };
+            steps.phi.extend(phi.transpose().iter());
+            steps.c.extend(c.transpose().iter());
+            for (j, of) in steps.of_input.iter_mut().enumerate() {
+                of.gamma.extend(gamma.column(j).iter());
+                of.d.extend(d.column(j).iter());
+                if let Some(corrected) = &corrected {
+                    of.observed.extend((corrected * d.column(j)).iter());
+                }
+            }
+        }
+        steps
+    }
+
+    /// Change of the outputs by signals that enter together, each between samples as `between` has it.
+    fn propagate(&self, column: usize, signals: &[Lanes], between: &[Lanes]) -> Vec<Vec<Lanes>> {
+        let (n, l) = (self.states, self.outputs);
+        let of = &self.of_input[column];
+        let mut out = vec![vec![[0.0; TOGETHER]; signals.len()]; l];
+        let (mut s, mut next) = (vec![[0.0; TOGETHER]; n], vec![[0.0; TOGETHER]; n]);
+        for (k, (b, push)) in signals.iter().zip(between).enumerate() {
+            for (o, y) in out.iter_mut().enumerate() {
+                let row = &self.c[(k * l + o) * n..][..n];
+                y[k] = product(row, &s, of.d[k * l + o], b);
+            }
+            let phi = &self.phi[k * n * n..][..n * n];
+            for (i, next) in next.iter_mut().enumerate() {
+                *next = product(&phi[i * n..][..n], &s, of.gamma[k * n + i], push);
+                if let Some(observed) = of.observed.get(k * n + i) {
+                    (0..TOGETHER).for_each(|w| next[w] -= observed * b[w]);
+                }
+            }
+            std::mem::swap(&mut s, &mut next);
+        }
+        out
+    }
+}
+
+/// `row s + factor b` in every lane.
+fn product(row: &[f64], s: &[Lanes], factor: f64, b: &Lanes) -> Lanes {
+    let mut sum = b.map(|b| factor * b);
+    for (a, s) in row.iter().zip(s) {
+        (0..TOGETHER).for_each(|w| sum[w] += a * s[w]);
+    }
+    sum
 }
 
 /// Places with the columns of the hooks that enter there.
@@ -59,24 +155,20 @@ pub(in crate::explain::engine) fn hooked(
     })
 }
 
-/// Linearises along the predictions, and fills in the values of the arguments.
+/// Linearises along the predictions of a fit, and fills in the values of the arguments. Signals are then propagated with the
+/// observer of the fit that is tested.
 pub(in crate::explain::engine) fn path(
     study: &Study,
-    fit: &Fit,
+    (fit, tested): (&Fit, &Fit),
     hooked: &Hooked,
     recordings: &[PlantRecording],
     arguments: &mut [Argument],
 ) -> Option<Path> {
     let trajectories = study.trajectories(fit)?;
     let l = study.outputs();
-    let mut path = Path {
-        phi: vec![],
-        gamma: vec![],
-        c: vec![],
-        d: vec![],
-    };
+    let mut path = Path(vec![]);
     let mut values: Vec<Vec<Vec<f64>>> = vec![Vec::new(); arguments.len()];
-    let gain = study.gain(fit);
+    let (gain, tested) = (study.gain(fit), study.gain(tested));
     for ((trajectory, recording), point) in
         trajectories.iter().zip(recordings).zip(study.points(fit))
     {
@@ -116,13 +208,8 @@ pub(in crate::explain::engine) fn path(
             .par_iter()
             .map(|linear| linear.discrete(recording.sample_time))
             .collect();
-        let (phi, gamma) = discrete.into_iter().unzip();
-        path.phi.push(phi);
-        path.gamma.push(gamma);
-        path.c
-            .push(all.iter().map(|p| p.c.rows(0, l).into_owned()).collect());
-        path.d
-            .push(all.iter().map(|p| p.d.rows(0, l).into_owned()).collect());
+        let steps = Steps::new(&all, (&discrete, l), tested.as_ref(), recording);
+        path.0.push(steps);
         for (to, column) in values.iter_mut().zip(of_arguments) {
             to.push(column);
         }
@@ -134,53 +221,28 @@ pub(in crate::explain::engine) fn path(
 }
 
 impl Path {
-    /// Change of the outputs by a signal that enters at a hook.
-    pub(crate) fn propagate(
-        &self,
-        column: usize,
-        signal: &[Vec<f64>],
-        held: bool,
-        gain: Option<&DMatrix<f64>>,
-    ) -> Series {
-        let mut out = Series::new();
-        for (r, b) in signal.iter().enumerate() {
-            let l = self.c[r].first().map_or(0, DMatrix::nrows);
-            let n = self.phi[r].first().map_or(0, DMatrix::nrows);
-            let mut y = vec![vec![0.0; b.len()]; l];
-            let (mut s, mut next) = (vec![0.0; n], vec![0.0; n]);
-            for k in 0..b.len() {
-                let (c, d) = (&self.c[r][k], &self.d[r][k]);
-                for o in 0..l {
-                    let mut sum = d[(o, column)] * b[k];
-                    for (j, s) in s.iter().enumerate() {
-                        sum += c[(o, j)] * s;
-                    }
-                    y[o][k] = sum;
+    /// Changes of the outputs by signals that enter at a hook, at most [`TOGETHER`] of them, each with whether it is held between
+    /// samples.
+    pub(crate) fn propagate(&self, column: usize, signals: &[(&Series, bool)]) -> Vec<Series> {
+        let mut all = vec![Series::new(); signals.len()];
+        for (r, steps) in self.0.iter().enumerate() {
+            let samples = signals.first().map_or(0, |(signal, _)| signal[r].len());
+            let mut values = vec![[0.0; TOGETHER]; samples];
+            let mut between = values.clone();
+            for (w, (signal, held)) in signals.iter().enumerate() {
+                let signal = &signal[r];
+                for (k, b) in signal.iter().enumerate() {
+                    let next = signal.get(k + 1).filter(|_| !held).unwrap_or(b);
+                    values[k][w] = *b;
+                    between[k][w] = 0.5 * (b + next);
                 }
-                if let Some(gain) = gain {
-                    for (i, s) in s.iter_mut().enumerate() {
-                        for (o, y) in y.iter().enumerate() {
-                            *s -= gain[(i, o)] * y[k];
-                        }
-                    }
-                }
-                let (phi, gamma) = (&self.phi[r][k], &self.gamma[r][k]);
-                let push = if held || k + 1 == b.len() {
-                    b[k]
-                } else {
-                    0.5 * (b[k] + b[k + 1])
-                };
-                for (i, next) in next.iter_mut().enumerate() {
-                    let mut sum = gamma[(i, column)] * push;
-                    for (j, s) in s.iter().enumerate() {
-                        sum += phi[(i, j)] * s;
-                    }
-                    *next = sum;
-                }
-                std::mem::swap(&mut s, &mut next);
             }
-            out.extend(y);
+            for y in steps.propagate(column, &values, &between) {
+                for (w, series) in all.iter_mut().enumerate() {
+                    series.push(y.iter().map(|lanes| lanes[w]).collect());
+                }
+            }
         }
-        out
+        all
     }
 }

@@ -5,6 +5,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::noise::{product, sum_of_squares};
 use crate::physics::estimate::{Fit, Study};
 
 /// A column of which less than this is left after projection is what parameters can do, but for rounding.
@@ -81,12 +82,10 @@ impl Projection {
 
     /// Projects parameters and initial states off; the products with their directions.
     pub(in crate::explain::engine) fn off(&self, column: &mut [f64]) -> DVector<f64> {
-        let products = self.q.column_iter().map(|q| {
-            let along: f64 = q.iter().zip(column.iter()).map(|(q, c)| q * c).sum();
-            column
-                .iter_mut()
-                .zip(q.iter())
-                .for_each(|(c, q)| *c -= along * q);
+        let rows = self.q.nrows().max(1);
+        let products = self.q.as_slice().chunks_exact(rows).map(|q| {
+            let along = product(q, column);
+            column.iter_mut().zip(q).for_each(|(c, q)| *c -= along * q);
             along
         });
         DVector::from_vec(products.collect())
@@ -104,14 +103,13 @@ impl Projection {
 
     /// Tests a whitened column; none where parameters can do the same.
     pub(crate) fn test(&self, mut column: Vec<f64>, free: bool) -> Option<Tested> {
-        let square = |c: &[f64]| c.iter().map(|v| v * v).sum::<f64>();
-        let before = square(&column);
+        let before = sum_of_squares(&column);
         let products = self.off(&mut column);
-        let after = square(&column);
+        let after = sum_of_squares(&column);
         if !(after > LEAST_LEFT * LEAST_LEFT * before && after.is_finite()) {
             return None;
         }
-        let along: f64 = column.iter().zip(&self.residual).map(|(c, r)| c * r).sum();
+        let along = product(&column, &self.residual);
         let mut signature = [0.0; SIGNATURE];
         for (c, noise) in column.iter().zip(&self.noise) {
             for (s, n) in signature.iter_mut().zip(noise) {

@@ -3,12 +3,11 @@
 //! A term is propagated through the plant linearised along its predictions, whitened as the residual is, and what parameters
 //! and initial states could do is projected off (C. R. Rao's score test, *Proc. Camb. Phil. Soc.* 44, 1948).
 
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::curve::{Curve, curves};
 use super::map::map;
-use super::path::{Hooked, Path, hooked, path};
+use super::path::{Hooked, Path, TOGETHER, hooked, path};
 use super::projection::{Projection, SIGNATURE};
 use crate::explain::document::plots::spectrum;
 use crate::explain::engine::fitting::edit::{Place, enters_several, is_of, sensors};
@@ -137,9 +136,8 @@ pub(crate) fn screen(
     let mut arguments = arguments(spec);
     arguments.retain(|a| a.variables.iter().all(|&v| is_of(spec, v, given)));
     let hooked = hooked(spec, given, &arguments)?;
-    let path = path(study, along, &hooked, recordings, &mut arguments)?;
+    let path = path(study, (along, fit), &hooked, recordings, &mut arguments)?;
     let projection = Projection::new(study, fit)?;
-    let gain = study.gain(fit);
     let sensors = sensors(spec);
     let inputs = spec.inputs();
     let shown: Vec<VariableId> = sensors
@@ -201,7 +199,6 @@ pub(crate) fn screen(
         hooked: &hooked,
         path: &path,
         projection: &projection,
-        gain: gain.as_ref(),
     };
     let (remembering, instances): (Vec<_>, Vec<_>) = instances
         .into_iter()
@@ -225,15 +222,7 @@ pub(crate) fn screen(
     let map = map(&leads, spec, &arguments, study.count(), significant);
     let leads = distinct(leads, spec, &arguments);
     let whiten = |series: &Series| fit.noise.whiten_kept(series, study.mask());
-    let curves = curves(
-        &leads,
-        &arguments,
-        &hooked,
-        &path,
-        &projection,
-        gain.as_ref(),
-        &whiten,
-    );
+    let curves = curves(&leads, &arguments, &hooked, &path, &projection, &whiten);
     Some(Screen {
         leads,
         curves,
@@ -253,113 +242,127 @@ struct Tests<'a> {
     hooked: &'a Hooked,
     path: &'a Path,
     projection: &'a Projection,
-    gain: Option<&'a DMatrix<f64>>,
 }
 
 impl Tests<'_> {
     /// Tests terms at every place that takes them.
     fn of(&self, chunk: &[Instance]) -> Vec<Lead> {
-        let spec = &self.study.plant().spec;
-        let outputs = spec.outputs();
-        let sensors = sensors(spec);
         let values = evaluate(chunk, self.arguments, self.recordings);
+        let signals: Vec<(&Instance, Series)> = (chunk.iter())
+            .zip(values.into_iter().flatten())
+            .filter(|(_, signal)| signal.iter().flatten().all(|v| v.is_finite()))
+            .collect();
         let mut leads = Vec::new();
-        for (instance, signal) in chunk.iter().zip(values.into_iter().flatten()) {
-            if !signal.iter().flatten().all(|v| v.is_finite()) {
-                continue;
+        for (instance, signal) in &signals {
+            if instance.term.port == Port::Sensor {
+                leads.extend(self.at_sensors(instance, signal));
             }
-            let argument = instance.argument.map(|a| &self.arguments[a]);
-            let held = argument.is_some_and(|a| a.held)
-                && instance.term.memories.iter().all(|m| m.sampled);
-            let mut test = |place: Place, sensor: bool, series: &Series| {
-                let column = self.fit.noise.whiten_kept(series, self.study.mask());
-                if let Some(tested) = self.projection.test(column, instance.term.free_strength) {
-                    leads.push(Lead {
-                        term: instance.term,
-                        place,
-                        sensor,
-                        argument: instance.argument,
-                        shapes: instance.shapes.clone(),
-                        strength: tested.strength,
-                        shift: tested.shift,
-                        statistic: tested.statistic,
-                        curve: None,
-                        signature: tested.signature,
-                    });
-                }
-            };
-            match instance.term.port {
-                Port::Sensor => {
-                    for &at in &sensors {
-                        let v = spec.equations[at].unknown.variable();
-                        let Some(o) = outputs.iter().position(|&y| y == v) else {
-                            continue;
-                        };
-                        let shown = spec.expressions.node(spec.equations[at].rest);
-                        let own = argument.is_none_or(|a| {
-                            a.variables == [v]
-                                || matches!(shown, Node::Variable(x) if a.variables == [x])
-                        });
-                        if !own {
-                            continue;
-                        }
-                        let l = outputs.len();
-                        let series: Series = (0..self.recordings.len() * l)
-                            .map(|s| {
-                                if s % l == o {
-                                    signal[s / l].clone()
-                                } else {
-                                    vec![0.0; signal[s / l].len()]
-                                }
-                            })
-                            .collect();
-                        test(Place::Equation(at), true, &series);
-                    }
-                }
-                port => {
-                    for (place, &column) in self.hooked.places.iter().zip(&self.hooked.columns) {
-                        let fits = match (*place, port) {
-                            (Place::Equation(at), Port::Equation)
-                                if instance.term.needs == Needs::OwnState =>
-                            {
-                                let own = spec.equations[at].unknown;
-                                argument.is_some_and(|a| own == Unknown::Derivative(a.variables[0]))
-                            }
-                            (Place::Equation(at), Port::Equation) => {
-                                argument.is_none_or(|a| a.known_after.is_none_or(|k| k < at))
-                            }
-                            (Place::Input(v), Port::Input) => {
-                                argument.is_some_and(|a| a.variables == [v])
-                            }
-                            // Equations that were found from columns have no variable for a force between bodies.
-                            (Place::Input(v), Port::Equation) => {
-                                instance.term.needs != Needs::OwnState
-                                    && is_without_units(spec)
-                                    && enters_several(spec, v)
-                                    && argument.is_some_and(|a| !a.held && a.known_after.is_none())
-                            }
-                            (Place::Parameter(p), Port::Parameter) => {
-                                let unit = spec.variable(p).unit_text.as_deref();
-                                let units = instance.term.units;
-                                let heats = || {
-                                    argument.is_some_and(|a| heats_itself(spec, p, &a.variables))
-                                };
-                                (units.is_empty()
-                                    || unit.is_some_and(|u| units.contains(&u))
-                                    || heats())
-                                    && argument.is_none_or(|a| a.known_after.is_none())
-                            }
-                            _ => false,
-                        };
-                        if fits {
-                            let series = self.path.propagate(column, &signal, held, self.gain);
-                            test(*place, false, &series);
-                        }
-                    }
-                }
+        }
+        for (&place, &column) in self.hooked.places.iter().zip(&self.hooked.columns) {
+            let here: Vec<&(&Instance, Series)> = (signals.iter())
+                .filter(|(instance, _)| self.fits(instance, place))
+                .collect();
+            for together in here.chunks(TOGETHER) {
+                let entering: Vec<(&Series, bool)> = (together.iter())
+                    .map(|(instance, signal)| (signal, self.is_held(instance)))
+                    .collect();
+                let propagated = self.path.propagate(column, &entering);
+                let each = together.iter().zip(&propagated);
+                leads
+                    .extend(each.filter_map(|((i, _), series)| self.test(i, place, false, series)));
             }
         }
         leads
+    }
+
+    fn argument(&self, instance: &Instance) -> Option<&Argument> {
+        instance.argument.map(|a| &self.arguments[a])
+    }
+
+    /// Whether a term stays between samples as it is.
+    fn is_held(&self, instance: &Instance) -> bool {
+        let argument = self.argument(instance);
+        argument.is_some_and(|a| a.held) && instance.term.memories.iter().all(|m| m.sampled)
+    }
+
+    /// Tests what a term does to the outputs.
+    fn test(
+        &self,
+        instance: &Instance,
+        place: Place,
+        sensor: bool,
+        series: &Series,
+    ) -> Option<Lead> {
+        let column = self.fit.noise.whiten_kept(series, self.study.mask());
+        let tested = (self.projection).test(column, instance.term.free_strength)?;
+        Some(Lead {
+            term: instance.term,
+            place,
+            sensor,
+            argument: instance.argument,
+            shapes: instance.shapes.clone(),
+            strength: tested.strength,
+            shift: tested.shift,
+            statistic: tested.statistic,
+            curve: None,
+            signature: tested.signature,
+        })
+    }
+
+    /// Tests a term of a sensor at the sensors that take it.
+    fn at_sensors(&self, instance: &Instance, signal: &Series) -> Vec<Lead> {
+        let spec = &self.study.plant().spec;
+        let outputs = spec.outputs();
+        let argument = self.argument(instance);
+        let l = outputs.len();
+        let of = |at: usize| {
+            let v = spec.equations[at].unknown.variable();
+            let o = outputs.iter().position(|&y| y == v)?;
+            let shown = spec.expressions.node(spec.equations[at].rest);
+            let own = argument.is_none_or(|a| {
+                a.variables == [v] || matches!(shown, Node::Variable(x) if a.variables == [x])
+            });
+            let series: Series = (0..self.recordings.len() * l)
+                .map(|s| match s % l == o {
+                    true => signal[s / l].clone(),
+                    false => vec![0.0; signal[s / l].len()],
+                })
+                .collect();
+            let test = || self.test(instance, Place::Equation(at), true, &series);
+            own.then(test).flatten()
+        };
+        sensors(spec).into_iter().filter_map(of).collect()
+    }
+
+    /// Whether a term that is none of a sensor may enter at a place.
+    fn fits(&self, instance: &Instance, place: Place) -> bool {
+        let spec = &self.study.plant().spec;
+        let argument = self.argument(instance);
+        match (place, instance.term.port) {
+            (Place::Equation(at), Port::Equation) if instance.term.needs == Needs::OwnState => {
+                let own = spec.equations[at].unknown;
+                argument.is_some_and(|a| own == Unknown::Derivative(a.variables[0]))
+            }
+            (Place::Equation(at), Port::Equation) => {
+                argument.is_none_or(|a| a.known_after.is_none_or(|k| k < at))
+            }
+            (Place::Input(v), Port::Input) => argument.is_some_and(|a| a.variables == [v]),
+            // Equations that were found from columns have no variable for a force between bodies.
+            (Place::Input(v), Port::Equation) => {
+                instance.term.needs != Needs::OwnState
+                    && is_without_units(spec)
+                    && enters_several(spec, v)
+                    && argument.is_some_and(|a| !a.held && a.known_after.is_none())
+            }
+            (Place::Parameter(p), Port::Parameter) => {
+                let unit = spec.variable(p).unit_text.as_deref();
+                let units = instance.term.units;
+                let heats = || argument.is_some_and(|a| heats_itself(spec, p, &a.variables));
+                (units.is_empty() || unit.is_some_and(|u| units.contains(&u)) || heats())
+                    && argument.is_none_or(|a| a.known_after.is_none())
+            }
+            _ => false,
+        }
     }
 
     /// Shapes between those that were tested, where descent cannot find the best, because what a recording says of them changes in
