@@ -14,7 +14,7 @@ use super::fitting::second_effect::drop_alike;
 use super::hypothesis::{Ground, trials};
 use super::scope::Scope;
 use super::screening::screen::{Lead, Screen, screen};
-use super::terms::names::{SPECIFIC, named, rank_of};
+use super::terms::names::{SPECIFIC, called, named, rank_of};
 use super::thresholds::{
     AT_A_PLACE, BETTER, COMPARED, FINISHED, FITTED, FOLLOWS, FORETOLD, GLANCE, GLANCED,
     GLANCED_STEPS, IMITATED, LEFT, MOST, MOST_STEPS, NEEDED, OF_A_KIND, THOROUGH, chance,
@@ -42,16 +42,17 @@ fn promising(screen: &Screen, spec: &ModelSpec, more: usize) -> Vec<Lead> {
             break;
         }
     }
-    // What has a name of its own is not crowded out by curves that imitate it.
+    // What has a name of its own is not crowded out by curves that imitate it, nor by its term in another place.
     let strong = screen.leads.first().map_or(0.0, |l| IMITATED * l.statistic);
-    let specific = |l: &&Lead| {
-        let variables = l
-            .argument
-            .map_or(&[][..], |a| &screen.arguments[a].variables);
-        l.statistic > strong && rank_of(spec, l.term, l.place, variables) < SPECIFIC
+    let variables = |l: &Lead| {
+        l.argument
+            .map_or(&[][..], |a| &screen.arguments[a].variables)
     };
+    let specific =
+        |l: &&Lead| l.statistic > strong && rank_of(spec, l.term, l.place, variables(l)) < SPECIFIC;
+    let id = |l: &Lead| called(spec, l.term, l.place, variables(l));
     for lead in screen.leads.iter().filter(specific) {
-        if !kept.iter().any(|l| l.term == lead.term) {
+        if !kept.iter().any(|l| id(l) == id(lead)) {
             kept.push(lead.clone());
         }
     }

@@ -68,6 +68,8 @@ impl Answer<'_> {
         let Some(own) = own else {
             return found;
         };
+        let again = (trial.accepted.is_none()).then(|| self.by_least_squares(own));
+        let own = &again.flatten().unwrap_or_else(|| own.clone());
         let first = self.base.parameters()
             + self.found.steps[..step]
                 .iter()
@@ -114,6 +116,37 @@ impl Answer<'_> {
         found.verdict = verdict(own, trial, &found, &at_bounds);
         found.sentence = self.hypothesis_sentence(&found, &at_bounds);
         found
+    }
+
+    /// A hypothesis beside the plant alone by least squares, where that is what the answer is by: a likelihood whose noise model
+    /// follows the recording says little of it.
+    fn by_least_squares(&self, own: &Fitted) -> Option<Fitted> {
+        if !self.found.options.least_squares {
+            return None;
+        }
+        let first = self.base.parameters();
+        let options = EstimateOptions {
+            free: vec![true; first],
+            ..self.found.options.clone()
+        };
+        let base = Study::new(self.plant, self.recordings, &options).ok()?;
+        let without = base.least_squares(&self.found.baseline.point)?;
+        let share = base.effective_share(&without)?;
+        let base = base.with_information(share);
+        let options = with_more(&options, own.candidate.names.len());
+        let study = Study::new(&own.candidate.plant, self.recordings, &options).ok()?;
+        let study = study.with_information(share);
+        let starts = [&own.fit.point, &own.candidate.from(&without, first).point];
+        let fits = starts
+            .into_iter()
+            .filter_map(|start| study.least_squares(start));
+        let fit = fits.min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
+        let gain = base.criterion(&without) - study.criterion(&fit);
+        Some(Fitted {
+            fit,
+            gain,
+            ..own.clone()
+        })
     }
 
     fn figures(

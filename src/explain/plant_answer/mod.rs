@@ -31,7 +31,7 @@ use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind
 use super::engine::scope::Scope;
 use super::engine::search::Found;
 use super::engine::select::{CHANCE, select};
-use super::engine::terms::term::Port;
+use super::engine::terms::term::{Port, Shape};
 use super::engine::thresholds::{LEFT, SURE, chance};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitTable, JointTest,
@@ -329,9 +329,15 @@ impl Answer<'_> {
     }
 
     /// Whether the recording tells the parameters of an effect from 0, all together: a strength and the level it acts from may be
-    /// known together only. So is an effect without parameters, and one whose covariance is not known.
+    /// known together only. An instant is not told from 0. So is an effect without parameters, and one whose covariance is not known.
     fn is_significant(&self, fitted: &Fitted) -> bool {
-        let places: Vec<usize> = self.parameters_of(fitted).map(|(_, at)| at).collect();
+        let shapes = fitted.lead.term.shapes;
+        let instant = |i: usize| shapes.get(i).is_some_and(Shape::is_instant);
+        let parameters = self.parameters_of(fitted).enumerate();
+        let places: Vec<usize> = parameters
+            .filter(|(i, _)| !instant(*i))
+            .map(|(_, (_, at))| at)
+            .collect();
         let values: Vec<f64> = places.iter().map(|&p| self.found.fit.point[p]).collect();
         let covariance = self
             .within_bounds
@@ -380,7 +386,7 @@ impl Answer<'_> {
         let of = |fitted: &Fitted| -> Vec<String> {
             let shapes = fitted.lead.term.shapes.iter().zip(&fitted.candidate.names);
             shapes
-                .filter(|(s, _)| s.symbol == "t0")
+                .filter(|(s, _)| s.is_instant())
                 .map(|(_, name)| name.clone())
                 .collect()
         };

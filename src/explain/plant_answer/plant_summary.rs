@@ -7,7 +7,7 @@ use super::within_bounds::at_bounds;
 use crate::explain::document::sentences::{number, p_value, quantity};
 use crate::explain::engine::fitting::fitted::TIE;
 use crate::explain::engine::select::CHANCE;
-use crate::explain::engine::thresholds::{LEFT, NEEDED};
+use crate::explain::engine::thresholds::{LEFT, NEEDED, SURE};
 use crate::explain::explanation::{
     Alternative, EffectFound, FitSteps, JointTest, OutputFit, ParameterChange, Quantity, Verdict,
 };
@@ -61,6 +61,15 @@ impl Answer<'_> {
                     lines.push(format!("{}.", effect.sentence));
                     lines.extend(self.estimates(fitted, effect, "Estimated"));
                 }
+                let first = self.effects().next();
+                lines.extend(first.filter(|f| f.gain < SURE).map(|f| {
+                    format!(
+                        "By BIC alone it would not be named (gain {}, needed {}): it takes more than half of the mean square off \
+                         held-out blocks, and no other function does as well.",
+                        number(f.gain),
+                        number(SURE)
+                    )
+                }));
                 lines.push(format!(
                     "Probability that this is right: {:.0} %; {}.",
                     100.0 * told.probability,
@@ -72,11 +81,16 @@ impl Answer<'_> {
                     "Something is missing in the equations, and no term of the library describes it surely.".to_owned(),
                 );
                 if told.astray {
-                    lines.push(format!(
-                        "The free run leaves {:.1} times the error of one-step predictions, and more than half of the variance: no \
-                         noise of a sensor is so slow.",
-                        told.strays
-                    ));
+                    lines.push(match told.strays > STRAYS {
+                        true => format!(
+                            "The free run leaves {:.1} times the error of one-step predictions, and more than half of the variance: \
+                             no noise of a sensor is so slow.",
+                            told.strays
+                        ),
+                        false => "The free run leaves more than half of the variance, and its error changes slowly: no noise of a \
+                                  sensor is so slow."
+                            .to_owned(),
+                    });
                 }
                 lines.extend(told.refused.map(|a| {
                     format!(
@@ -275,13 +289,21 @@ fn free_runs(outputs: &[OutputFit], with_effects: bool) -> String {
     }
 }
 
+/// A fit in percent; of a run that leaves the recording altogether only that it does.
+fn percent(fit: f64) -> String {
+    match fit < -1000.0 {
+        true => "< -1000 %".to_owned(),
+        false => format!("{fit:.1} %"),
+    }
+}
+
 /// Fits of outputs; what each is, is said of the first.
 fn listed<const N: usize>(outputs: &[OutputFit], fits: &[[f64; N]], words: [&str; N]) -> String {
     let each = outputs.iter().zip(fits).enumerate();
     let each = each.map(|(i, (output, fits))| {
         let said = fits.iter().zip(words).map(|(fit, word)| match i {
-            0 => format!("{fit:.1} % {word}"),
-            _ => format!("{fit:.1} %"),
+            0 => format!("{} {word}", percent(*fit)),
+            _ => percent(*fit),
         });
         let said = said.collect::<Vec<_>>().join(", ");
         match outputs.len() {

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::explain::engine::fitting::fitted::{Fitted, searched, with_more};
+use crate::explain::engine::screening::along::along;
 use crate::explain::engine::terms::names::{SPECIFIC, rank};
 use crate::explain::engine::thresholds::{FINISHED, MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
@@ -20,7 +21,7 @@ pub(in crate::explain::engine) fn finished(
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let best = fitted.first().map_or(0.0, |f| f.gain);
     let spec = &study.plant().spec;
-    let refined: Vec<Option<Fit>> = fitted
+    let refined: Vec<Option<(Fit, Option<(f64, f64)>)>> = fitted
         .par_iter()
         .enumerate()
         .map(|(i, f)| {
@@ -32,16 +33,26 @@ pub(in crate::explain::engine) fn finished(
             let options = with_more(options, f.candidate.values.len());
             let limited = f.candidate.plant.clone().with_most_steps(MOST_STEPS);
             let inner = study.of(&limited, &options).ok()?;
-            inner.refit(&f.fit, ROUNDS, THOROUGH)
+            let refined = inner.refit(&f.fit, ROUNDS, THOROUGH)?;
+            // Of a plant that the term has changed much, its variable has other values than before.
+            let range = (!f.argument.is_empty()).then(|| {
+                let values = along((&inner, &refined), recordings, &[f.argument.clone()])?.pop()?;
+                let from = values.iter().copied().min_by(f64::total_cmp)?;
+                Some((from, values.iter().copied().max_by(f64::total_cmp)?))
+            });
+            Some((refined, range.flatten()))
         })
         .collect();
     for (f, refined) in fitted.iter_mut().zip(refined) {
-        let Some(refined) = refined else { continue };
+        let Some((refined, range)) = refined else {
+            continue;
+        };
         if refined.criterion < f.fit.criterion {
             f.gain = before.criterion - refined.criterion - searched(&f.lead, recordings);
             let first = options.free.len();
             f.shapes = refined.point[first..][..f.lead.shapes.len()].to_vec();
             f.fit = refined;
+            f.range = range.unwrap_or(f.range);
         }
     }
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));

@@ -13,6 +13,8 @@ pub(crate) const TIE: (f64, f64) = (6.0, 0.08);
 /// The same where the best is a curve: it is free to follow any effect (math/physics.md, "Fits and decision"). The first also
 /// where it is an unlisted formula.
 const TIE_WITH_CURVE: (f64, f64) = (12.0, 0.04);
+/// Deviances that differ by less are equal: two, as Akaike's criterion has it for a number that says nothing.
+const ALIKE: f64 = 2.0;
 /// A gain must not rest on so few values: they may be errors of the recording.
 const FEW: usize = 1;
 
@@ -153,6 +155,7 @@ fn moved(spec: &ModelSpec, fit: &Fit) -> f64 {
 pub(in crate::explain::engine) fn order(spec: &ModelSpec, fitted: &mut [Fitted]) {
     // Among those that explain the recording as well as the best, the one with a name of its own comes first. Of several such
     // the best, unless their gains are equal.
+    let free = spec.inputs().is_empty();
     if let Some(first) = fitted.first() {
         let best = first.gain;
         // An unlisted formula is as free as a curve, of which there are many.
@@ -165,10 +168,16 @@ pub(in crate::explain::engine) fn order(spec: &ModelSpec, fitted: &mut [Fitted])
             None => TIE.1,
         };
         let tie = least.max(part * best);
-        let ties = fitted.iter().take_while(|f| best - f.gain <= tie).count();
+        // Where nothing drives the plant, a lag of its sensor and a store beside it are the same but for a number: they fit alike.
+        let deviance = first.fit.deviance;
+        let alike = |f: &Fitted| free && f.fit.deviance <= deviance + ALIKE;
+        let tied = |f: &Fitted| best - f.gain <= tie || alike(f);
+        fitted.sort_by_key(|f| !tied(f));
+        let ties = fitted.iter().take_while(|f| tied(f)).count();
         fitted[..ties].sort_by_key(|f| name_rank(spec, f));
         let (first, of_name) = (fitted[0].gain, name_rank(spec, &fitted[0]));
-        let equal = |f: &&Fitted| first - f.gain <= TIE.0 && name_rank(spec, f) == of_name;
+        let equal =
+            |f: &&Fitted| (first - f.gain <= TIE.0 || alike(f)) && name_rank(spec, f) == of_name;
         let equals = fitted[..ties].iter().take_while(equal).count();
         // Formulas of one curve differ in what they are, not in where they leave the parameters.
         let supported = |f: &Fitted| match rank(spec, f) < SPECIFIC {

@@ -5,20 +5,19 @@ use rayon::prelude::*;
 
 use super::{Change, Hypothesis, NewNumber};
 use crate::explain::engine::fitting::candidate::Candidate;
-use crate::explain::engine::fitting::edit::{Edit, Place, literal, sensors};
+use crate::explain::engine::fitting::edit::{Place, literal, sensors};
 use crate::explain::engine::fitting::fitted::{Fitted, TIE, forms, with_more};
+use crate::explain::engine::screening::along::along;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::term::{Needs, Port, Term};
 use crate::explain::engine::thresholds::{GLANCE, NEEDED, ROUNDS, SECOND, SURE, THOROUGH};
+use crate::physics::Plant;
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
-use crate::physics::{ModelSpec, Plant, VariableKind};
 
 /// Starts of a hypothesis that are looked at.
 const STARTS: usize = 24;
 /// ... and the best of them, which are fitted with a noise model of their own.
 const FITTED: usize = 2;
-/// Samples that values of variables are taken of.
-const LOOKED_AT: usize = 1000;
 /// Penalty for a parameter whose start was searched, as for the shapes of the library's terms.
 const SEARCHED: f64 = 2.0;
 
@@ -174,7 +173,8 @@ impl Hypothesis {
             .filter(|d| spec.find(d).is_some())
             .collect();
         let texts: Vec<String> = variables.iter().map(|v| (*v).clone()).collect();
-        let values = along(ground, &texts).unwrap_or_default();
+        let values =
+            (along((ground.study, ground.fit), ground.recordings, &texts)).unwrap_or_default();
         let range = match values.as_slice() {
             [one] => one
                 .iter()
@@ -276,7 +276,7 @@ impl Hypothesis {
             };
             let mut texts = vec![old.clone(), at(None)];
             texts.extend(free.iter().map(|&i| at(Some(i))));
-            let Some(columns) = along(ground, &texts) else {
+            let Some(columns) = along((ground.study, ground.fit), ground.recordings, &texts) else {
                 continue;
             };
             let rows: Vec<usize> = (0..columns[0].len())
@@ -344,44 +344,4 @@ fn thinned(all: Vec<Vec<f64>>, most: usize) -> Vec<Vec<f64>> {
     chosen.sort_unstable();
     chosen.dedup();
     chosen.into_iter().map(|i| all[i].clone()).collect()
-}
-
-/// Values of expressions along the predictions, for all recordings one after the other.
-fn along(ground: &Ground, texts: &[String]) -> Option<Vec<Vec<f64>>> {
-    if texts.is_empty() {
-        return Some(vec![]);
-    }
-    let spec = &ground.plant.spec;
-    let edit = Edit {
-        declarations: (0..texts.len())
-            .map(|i| format!("output Real probe_{i};"))
-            .collect(),
-        equations: texts
-            .iter()
-            .enumerate()
-            .map(|(i, text)| format!("probe_{i} = {text};"))
-            .collect(),
-        ..Edit::default()
-    };
-    let probed: ModelSpec = edit.apply(spec).ok()?;
-    debug_assert!(probed.of_kind(VariableKind::Input).count() == spec.inputs().len());
-    let plant = Plant::new(probed);
-    let outputs = ground.study.outputs();
-    let mut columns = vec![Vec::new(); texts.len()];
-    let trajectories = ground.study.trajectories(ground.fit)?;
-    let points = ground.study.points(ground.fit);
-    for ((trajectory, recording), point) in trajectories.iter().zip(ground.recordings).zip(points) {
-        let samples = recording.outputs.first().map_or(0, Vec::len);
-        let mut lineariser = plant.lineariser(&point);
-        for k in (0..samples).step_by((samples / LOOKED_AT).max(1)) {
-            let state: Vec<f64> = trajectory.states.iter().map(|x| x[k]).collect();
-            let inputs: Vec<f64> = recording.inputs.iter().map(|u| u[k]).collect();
-            let time = recording.start_time + k as f64 * recording.sample_time;
-            let linear = lineariser.at(&state, &inputs, time);
-            for (column, &v) in columns.iter_mut().zip(&linear.output[outputs..]) {
-                column.push(v);
-            }
-        }
-    }
-    Some(columns)
 }

@@ -111,6 +111,13 @@ pub(crate) struct Shape {
     pub(crate) positive: bool,
 }
 
+impl Shape {
+    /// Whether it is a time of the recording.
+    pub(crate) fn is_instant(&self) -> bool {
+        matches!(self.starts, Starts::Instants(_))
+    }
+}
+
 /// A term.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Term {
