@@ -71,6 +71,19 @@ impl Found {
         }
     }
 
+    /// Gives the effects the shapes of the final fit: names depend on them.
+    pub(crate) fn take_shapes(&mut self) {
+        let mut first = self.given.spec.parameters().len();
+        let accepted = self.steps.iter_mut().take(self.accepted);
+        for effect in accepted.filter_map(|step| step.first_mut()) {
+            let count = effect.shapes.len();
+            if let Some(shapes) = self.fit.point.get(first..first + count) {
+                effect.shapes.copy_from_slice(shapes);
+            }
+            first += effect.candidate.values.len();
+        }
+    }
+
     /// Drops all effects but the first `accepted`.
     pub(crate) fn keep(&mut self, accepted: usize) {
         if accepted >= self.accepted {

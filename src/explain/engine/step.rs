@@ -52,7 +52,8 @@ fn promising(screen: &Screen, spec: &ModelSpec, more: usize) -> Vec<Lead> {
         |l: &&Lead| l.statistic > strong && rank_of(spec, l.term, l.place, variables(l)) < SPECIFIC;
     let id = |l: &Lead| called(spec, l.term, l.place, variables(l));
     for lead in screen.leads.iter().filter(specific) {
-        if !kept.iter().any(|l| id(l) == id(lead)) {
+        let same = |l: &Lead| l.term == lead.term && id(l) == id(lead);
+        if !kept.iter().any(same) {
             kept.push(lead.clone());
         }
     }

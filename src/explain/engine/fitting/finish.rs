@@ -47,12 +47,12 @@ pub(in crate::explain::engine) fn finished(
         let Some((refined, range)) = refined else {
             continue;
         };
+        f.range = range.unwrap_or(f.range);
         if refined.criterion < f.fit.criterion {
             f.gain = before.criterion - refined.criterion - searched(&f.lead, recordings);
             let first = options.free.len();
             f.shapes = refined.point[first..][..f.lead.shapes.len()].to_vec();
             f.fit = refined;
-            f.range = range.unwrap_or(f.range);
         }
     }
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
