@@ -56,7 +56,7 @@ mod tests {
     #[test]
     fn times_without_a_divisor_are_near_points_and_bursts_have_no_grid() {
         let step = common_step(&[0.0, 1.0, std::f64::consts::PI, 10.0]).unwrap();
-        assert!(step <= 0.1 && step >= 1e-3, "{step}");
+        assert!((1e-3..=0.1).contains(&step), "{step}");
         let bursts: Vec<f64> = (0..200)
             .map(|k| f64::from(k / 2) * 1000.0 + f64::from(k % 2) * 1e-3)
             .collect();

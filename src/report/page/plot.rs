@@ -254,14 +254,26 @@ fn ends(values: impl IntoIterator<Item = f64>, logarithmic: bool, room: f64) -> 
     Some([back(low - room), back(high + room)])
 }
 
+/// Whether most values have no neighbour that a line could go to.
+fn stand_alone(points: &[(f64, f64)]) -> bool {
+    let known = points.iter().filter(|(_, y)| y.is_finite()).count();
+    let both = |w: &&[(f64, f64)]| w[0].1.is_finite() && w[1].1.is_finite();
+    known > 0 && 2 * points.windows(2).filter(both).count() < known && known < points.len()
+}
+
 impl Series {
-    /// A line, thinned where it has more points than a screen can show; broken where a value is not finite.
+    /// A line, thinned where it has more points than a screen can show; broken where a value is not finite, and dots where most
+    /// values stand alone.
     pub(in crate::report) fn line(
         name: impl Into<String>,
         style: &'static str,
         points: impl IntoIterator<Item = (f64, f64)>,
     ) -> Self {
-        let points: Vec<(f64, f64)> = points.into_iter().collect();
+        let mut points: Vec<(f64, f64)> = points.into_iter().collect();
+        if stand_alone(&points) {
+            points.retain(|(_, y)| y.is_finite());
+            return Self::of(name, style, Kind::Dots, points);
+        }
         Self::of(name, style, Kind::Line, thinned(&points))
     }
 
@@ -411,6 +423,18 @@ mod tests {
         assert_eq!(shade(11.0, 12.0), None);
         assert_eq!(shade(f64::NAN, f64::NAN), None);
         assert_eq!(shade(4.0, 3.0), None);
+    }
+
+    #[test]
+    fn values_that_stand_alone_are_dots() {
+        let every = |step: usize| {
+            let at = |k| {
+                if k % step == 0 { k as f64 } else { f64::NAN }
+            };
+            Series::line("y", "recorded", (0..20).map(|k| (k as f64, at(k))))
+        };
+        assert_eq!((every(1).kind, every(4).kind), (Kind::Line, Kind::Dots));
+        assert_eq!(every(4).x.len(), 5);
     }
 
     #[test]

@@ -10,6 +10,10 @@ use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 
 /// Names that gain this part of the best are finished too.
 const HALF: f64 = 0.5;
+
+/// Smallest and largest value.
+type Range = (f64, f64);
+
 /// The best of all fits, fitted until nothing changes; the others as they are. Best first.
 pub(in crate::explain::engine) fn finished(
     mut fitted: Vec<Fitted>,
@@ -21,7 +25,7 @@ pub(in crate::explain::engine) fn finished(
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let best = fitted.first().map_or(0.0, |f| f.gain);
     let spec = &study.plant().spec;
-    let refined: Vec<Option<(Fit, Option<(f64, f64)>)>> = fitted
+    let refined: Vec<Option<(Fit, Option<Range>)>> = fitted
         .par_iter()
         .enumerate()
         .map(|(i, f)| {
@@ -36,7 +40,12 @@ pub(in crate::explain::engine) fn finished(
             let refined = inner.refit(&f.fit, ROUNDS, THOROUGH)?;
             // Of a plant that the term has changed much, its variable has other values than before.
             let range = (!f.argument.is_empty()).then(|| {
-                let values = along((&inner, &refined), recordings, &[f.argument.clone()])?.pop()?;
+                let values = along(
+                    (&inner, &refined),
+                    recordings,
+                    std::slice::from_ref(&f.argument),
+                )?
+                .pop()?;
                 let from = values.iter().copied().min_by(f64::total_cmp)?;
                 Some((from, values.iter().copied().max_by(f64::total_cmp)?))
             });

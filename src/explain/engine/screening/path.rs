@@ -26,6 +26,9 @@ struct Steps {
     of_input: Vec<OfInput>,
 }
 
+/// `A` and `B` from one sample to the next.
+type Discrete = (DMatrix<f64>, DMatrix<f64>);
+
 /// What one input does.
 struct OfInput {
     /// To the next states, and to the outputs.
@@ -39,7 +42,7 @@ impl Steps {
     /// Of discrete systems with the gain of an observer, which corrects by what was measured.
     fn new(
         plants: &[LinearPlant],
-        (discrete, l): (&[(DMatrix<f64>, DMatrix<f64>)], usize),
+        (discrete, l): (&[Discrete], usize),
         gain: Option<&DMatrix<f64>>,
         recording: &PlantRecording,
     ) -> Self {
@@ -204,7 +207,7 @@ pub(in crate::explain::engine) fn path(
             }
             all.push(linear);
         }
-        let discrete: Vec<(DMatrix<f64>, DMatrix<f64>)> = all
+        let discrete: Vec<Discrete> = all
             .par_iter()
             .map(|linear| linear.discrete(recording.sample_time))
             .collect();

@@ -55,7 +55,8 @@ pub(super) fn view(
         .map(|r| r.outputs.first().map_or(0, Vec::len))
         .sum();
     let sentence = plant_verdict(document, &format!("{} from {samples} samples", spec.name));
-    let (about, headline) = sentence.split_once(": ").unwrap_or(("", &sentence));
+    let (about, answer) = sentence.split_once(": ").unwrap_or(("", &sentence));
+    let (headline, rest) = answer.split_once("; ").unwrap_or((answer, ""));
     let (kind, class) = match (
         leaves_something_out(document),
         document.undetermined.is_empty(),
@@ -104,10 +105,12 @@ pub(super) fn view(
         },
         kind,
         headline: capitalised(headline),
-        about: match about {
-            "" => String::new(),
-            about => format!("{about}."),
-        },
+        about: [about.to_owned(), capitalised(rest)]
+            .iter()
+            .filter(|said| !said.is_empty())
+            .map(|said| format!("{said}."))
+            .collect::<Vec<_>>()
+            .join(" "),
         remarks,
         fit: fit(document),
         parameters: Table::of(
