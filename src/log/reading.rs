@@ -533,7 +533,7 @@ impl Assembly<'_> {
             parts.push((from, Filled { from: 0, columns }));
         }
         let how = match (wanted > step, places) {
-            (_, true) => "inputs held, outputs compared only where they were measured,",
+            (_, true) => "inputs held, outputs compared only where they were measured, put",
             (true, _) => "low-pass filtered and put",
             (false, _) => "inputs held, outputs joined by lines, put",
         };

@@ -2,7 +2,7 @@
 
 use realfft::RealFftPlanner;
 
-use super::{Mask, Series};
+use super::{Mask, Series, kept};
 
 /// Number of independent values whose mean is as uncertain as that of the residual, summed over recordings and outputs: the
 /// number of values over the integrated autocorrelation time `1 + 2 (r1 + r2 + ...)`. Sums of two neighbours are added while
@@ -17,8 +17,7 @@ pub(crate) fn effective_samples(residual: &Series, mask: &Mask) -> f64 {
 }
 
 fn of_one(e: &[f64], keep: &[bool]) -> f64 {
-    let known = e.iter().zip(keep).filter(|(_, k)| **k);
-    let mut padded: Vec<f64> = known.map(|(e, _)| *e).collect();
+    let mut padded = kept(e, keep);
     let count = padded.len();
     if count < 4 {
         return count as f64;

@@ -308,13 +308,20 @@ fn each_stretch(column: &[f64], mask: &[bool], mut of: impl FnMut(&[f64])) {
 
 /// The values that count, where most of them have no neighbour.
 fn standing_alone(column: &[f64], mask: &[bool]) -> Option<Vec<f64>> {
+    stand_alone(mask).then(|| kept(column, mask))
+}
+
+/// Whether most of what counts has no neighbour that counts.
+pub(crate) fn stand_alone(mask: &[bool]) -> bool {
     let count = mask.iter().filter(|keep| **keep).count();
     let followed = mask.windows(2).filter(|w| w[0] && w[1]).count();
-    if count == 0 || 2 * followed >= count || count == mask.len() {
-        return None;
-    }
+    2 * followed < count && count < mask.len()
+}
+
+/// The values that count, one after the other.
+pub(crate) fn kept(column: &[f64], mask: &[bool]) -> Vec<f64> {
     let kept = column.iter().zip(mask).filter(|(_, keep)| **keep);
-    Some(kept.map(|(v, _)| *v).collect())
+    kept.map(|(v, _)| *v).collect()
 }
 
 #[cfg(test)]

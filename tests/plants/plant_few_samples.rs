@@ -17,7 +17,7 @@ end Culture;
 "#;
 
 /// A drug that is in the blood at once.
-const BOLUS: &str = r#"model Bolus
+pub const BOLUS: &str = r#"model Bolus
   parameter Real ke(unit="1/h", min=0.01, max=0.5) = 0.08;
   output Real y(unit="mg/l");
   Real c(unit="mg/l", start=10);

@@ -3,18 +3,8 @@
 use std::fmt::Write;
 
 use crate::folder::{Folder, columns};
+use crate::plant_few_samples::BOLUS;
 use crate::plant_initial_states::noise;
-
-/// A drug that is in the blood at once, and eliminated in proportion.
-const BOLUS: &str = r#"model Bolus
-  parameter Real ke(unit="1/h", min=0.01, max=2) = 0.3;
-  output Real y(unit="mg/l");
-  Real c(unit="mg/l", start=10);
-equation
-  der(c) = -ke*c/3600;
-  y = c;
-end Bolus;
-"#;
 
 /// Water that a heater warms, with the loss to the room.
 const KETTLE: &str = r#"model Kettle

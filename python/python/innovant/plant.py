@@ -107,8 +107,9 @@ class Plant:
         least_squares: bool = False,
     ) -> PlantEstimate:
         """Estimates parameters and initial states by maximum likelihood. Lists of arrays are several recordings; a frame
-        with the columns of inputs and outputs stands for both. Outputs may be NaN where they were not measured. ``form`` is ``"free run"``, ``"innovation"`` or the likelier
-        (None); ``least_squares`` fits the free run as if its error were white."""
+        with the columns of inputs and outputs stands for both. Outputs may be NaN where they were not measured. ``form`` is
+        ``"free run"``, ``"innovation"`` or the likelier (None); ``least_squares`` fits the free run as if its error were
+        white."""
         data = self._recordings(u, y, dt)
         fixed = [fix] if isinstance(fix, str) else list(fix)
         document, text = self._plant.fit(data.u, data.y, data.dt, fixed, hold, form, least_squares)

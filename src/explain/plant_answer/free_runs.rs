@@ -74,17 +74,15 @@ impl Answer<'_> {
         }
     }
 
+    /// An output of all recordings, one after the other.
+    pub(super) fn column(&self, series: &Series, output: usize) -> Vec<f64> {
+        let of_output = series.iter().skip(output).step_by(self.base.outputs());
+        of_output.flatten().copied().collect()
+    }
+
     /// The figures of an output over all recordings.
     pub(super) fn steps(&self, runs: &FreeRuns, output: usize, p_value: f64) -> FitSteps {
-        let l = self.base.outputs();
-        let column = |s: &Series| -> Vec<f64> {
-            s.iter()
-                .skip(output)
-                .step_by(l)
-                .flatten()
-                .copied()
-                .collect()
-        };
+        let column = |s: &Series| self.column(s, output);
         let (y, with) = (column(&runs.recorded), column(&runs.with));
         FitSteps {
             simulation: figure(&y, &column(&runs.given)),

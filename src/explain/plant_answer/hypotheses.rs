@@ -156,16 +156,8 @@ impl Answer<'_> {
         with: &Series,
         output: usize,
     ) -> HypothesisFit {
-        let l = self.base.outputs();
-        let column = |s: &Series| -> Vec<f64> {
-            s.iter()
-                .skip(output)
-                .step_by(l)
-                .flatten()
-                .copied()
-                .collect()
-        };
-        let of = |s: &Series| -> FitFigure { figure(&column(recorded), &column(s)) };
+        let recorded = self.column(recorded, output);
+        let of = |s: &Series| -> FitFigure { figure(&recorded, &self.column(s, output)) };
         HypothesisFit {
             output: self.outputs()[output].0.clone(),
             parameters_only: of(only),

@@ -12,8 +12,8 @@ use super::adequacy::{self, Question, ResidualTest};
 use super::deviance::{Deviance, invert};
 use super::optimise::{Range, minimise};
 use super::problem::Problem;
-use super::{EstimateError, EstimateOptions, Form, PlantRecording, ROUND, kept};
-use crate::noise::{Colour, Colours, Noise};
+use super::{EstimateError, EstimateOptions, Form, PlantRecording, ROUND};
+use crate::noise::{Colour, Colours, Noise, kept};
 use crate::physics::simulation::{Hold, Plant, Point};
 
 /// Eigenvalues of the regressors' correlation below this are rounding.

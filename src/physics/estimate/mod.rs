@@ -35,7 +35,7 @@ pub(crate) use self::optimise::Effort;
 use self::problem::Problem;
 use super::simulated::Simulated;
 use super::simulation::{Hold, Point};
-use crate::noise::Noise;
+use crate::noise::{Noise, kept};
 
 /// How the predictions of a plant are formed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -314,12 +314,6 @@ fn held_out(problem: &Problem, fit: &Fit) -> Option<Vec<Vec<f64>>> {
         Form::Innovation => observer::fit(&short, Some(&fit.point[..numbers]))?,
     };
     Deviance::new(problem, Form::FreeRun, again.noise).simulated(&again.point[..numbers])
-}
-
-/// Values that count, one after the other.
-fn kept(series: &[f64], mask: &[bool]) -> Vec<f64> {
-    let kept = series.iter().zip(mask).filter(|(_, keep)| **keep);
-    kept.map(|(e, _)| *e).collect()
 }
 
 /// Tests of the residuals: are they white, and no function of the inputs? What the parameters could do is taken out of neither

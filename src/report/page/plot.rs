@@ -1,5 +1,6 @@
 //! A picture as data: axes, series, shaded windows. `draw.js` draws it with plotly.js; nothing here knows how.
 
+use crate::noise::stand_alone;
 use serde::{Serialize, Serializer};
 
 use super::thin::{rounded, thinned};
@@ -254,13 +255,6 @@ fn ends(values: impl IntoIterator<Item = f64>, logarithmic: bool, room: f64) -> 
     Some([back(low - room), back(high + room)])
 }
 
-/// Whether most values have no neighbour that a line could go to.
-fn stand_alone(points: &[(f64, f64)]) -> bool {
-    let known = points.iter().filter(|(_, y)| y.is_finite()).count();
-    let both = |w: &&[(f64, f64)]| w[0].1.is_finite() && w[1].1.is_finite();
-    known > 0 && 2 * points.windows(2).filter(both).count() < known && known < points.len()
-}
-
 impl Series {
     /// A line, thinned where it has more points than a screen can show; broken where a value is not finite, and dots where most
     /// values stand alone.
@@ -270,7 +264,8 @@ impl Series {
         points: impl IntoIterator<Item = (f64, f64)>,
     ) -> Self {
         let mut points: Vec<(f64, f64)> = points.into_iter().collect();
-        if stand_alone(&points) {
+        let known: Vec<bool> = points.iter().map(|(_, y)| y.is_finite()).collect();
+        if stand_alone(&known) {
             points.retain(|(_, y)| y.is_finite());
             return Self::of(name, style, Kind::Dots, points);
         }
