@@ -167,15 +167,20 @@ impl<'a, const M: usize> Field<'a, M> {
         jumps
     }
 
-    /// Boundaries of the parts of a sample in which every delayed input is constant, as fractions of the sample. Delays of
-    /// whole samples, or equal ones, make parts of length 0, whose slopes count.
-    pub(crate) fn boundaries(&self) -> Vec<Dual<M>> {
+    /// Parts of a sample in which every delayed input is constant: start and length, in seconds. Delays of whole samples, or
+    /// equal ones, make parts of length 0, whose slopes count.
+    pub(crate) fn parts(&self) -> Vec<(Dual<M>, Dual<M>)> {
         let mut jumps: Vec<&Jump<M>> = self.jumps.iter().filter(|j| j.rank > 0).collect();
         jumps.sort_by_key(|j| j.rank);
         let mut boundaries = vec![Dual::constant(0.0)];
         boundaries.extend(jumps.into_iter().map(|j| j.phase));
         boundaries.push(Dual::constant(1.0));
-        boundaries
+        let h = self.excitation.sample_time;
+        let zero = Dual::constant(0.0);
+        let pairs = boundaries.windows(2);
+        pairs
+            .map(|w| (zero.plus(h, &w[0]), zero.plus(h, &w[1]).plus(-h, &w[0])))
+            .collect()
     }
 
     /// Chooses the sample that each delayed input comes from: for a part between two boundaries, or at the sample itself.

@@ -13,13 +13,16 @@ use super::plant::{Direction, Excitation, Observer, Plan, Plant, Point};
 
 /// Parameters whose derivatives are computed in one sweep.
 const TOGETHER: usize = 8;
-/// Terms of the series, for matrices of norm up to [`SCALED`]: the rest is below 1e-9.
+/// Most terms of the series, and the norm of a matrix whose series is summed.
 const TERMS: usize = 9;
 const SCALED: f64 = 0.5;
+/// Terms below this are left out: what a sample changes within it is known less well.
+const LAST_TERM: f64 = 1e-9;
 
 /// Square matrices by rows.
 type Matrix = Vec<f64>;
 
+#[inline(always)]
 fn product(n: usize, a: &[f64], b: &[f64], into: &mut [f64]) {
     into.fill(0.0);
     for i in 0..n {
@@ -53,6 +56,7 @@ impl Exponential {
         }
     }
 
+    #[inline(always)]
     fn of(&mut self, matrix: &[f64], factor: f64) {
         let n = self.n;
         let norm = matrix
@@ -67,9 +71,15 @@ impl Exponential {
         }
         let add_identity = |m: &mut Matrix| (0..n).for_each(|i| m[i * n + i] += 1.0);
         // Horner: phi = I + A/2 (I + A/3 (I + ...)).
+        let norm = norm * 0.5f64.powi(halvings);
+        let mut last = 1.0;
+        let terms = (2..=TERMS).find(|&term| {
+            last *= norm / term as f64;
+            last < LAST_TERM
+        });
         self.phi.fill(0.0);
         add_identity(&mut self.phi);
-        for term in (2..=TERMS).rev() {
+        for term in (2..=terms.unwrap_or(TERMS)).rev() {
             product(n, &self.scaled, &self.phi, &mut self.room);
             for (to, from) in self.phi.iter_mut().zip(&self.room) {
                 *to = from / term as f64;
@@ -104,6 +114,24 @@ impl Plant {
         if !self.tape.delays.is_empty() || self.linearity.holds(excitation.hold) {
             return None;
         }
+        let columns = self.tape.arch.dispatch(
+            #[inline(always)]
+            || self.frozen_columns(point, excitation, observer, plan, states, directions),
+        );
+        let finite = columns.iter().flatten().flatten().all(|v| v.is_finite());
+        finite.then_some(columns)
+    }
+
+    #[inline(always)]
+    fn frozen_columns(
+        &self,
+        point: &Point,
+        excitation: &Excitation,
+        observer: Option<&Observer>,
+        plan: &Plan,
+        states: &[Vec<f64>],
+        directions: &[Direction],
+    ) -> Vec<Vec<Vec<f64>>> {
         let (n, l, d) = (states.len(), self.tape.outputs.len(), directions.len());
         let of_parameters: Vec<usize> = (0..d)
             .filter(|&i| matches!(directions[i], Direction::Parameter(_)))
@@ -231,8 +259,7 @@ impl Plant {
             }
             std::mem::swap(&mut slopes, &mut next);
         }
-        let finite = columns.iter().flatten().flatten().all(|v| v.is_finite());
-        finite.then_some(columns)
+        columns
     }
 }
 

@@ -20,6 +20,8 @@ pub(super) struct Integrator<'a, const M: usize> {
     pub(super) x: Vec<Dual<M>>,
     pub(super) first: Vec<Dual<M>>,
     pub(super) next: Vec<Dual<M>>,
+    /// Parts of a sample between the jumps of delayed inputs: start and length, in seconds.
+    pub(super) parts: Vec<(Dual<M>, Dual<M>)>,
     /// For a plant that is linear in its states.
     pub(super) propagator: Option<Propagator<M>>,
 }
@@ -67,22 +69,6 @@ impl<const M: usize> Integrator<'_, M> {
         );
     }
 
-    /// Parts of a sample between the jumps of delayed inputs: start and length, in seconds.
-    pub(crate) fn parts(&self, k: usize, excitation: &Excitation) -> Vec<(Dual<M>, Dual<M>)> {
-        let h = excitation.sample_time;
-        let boundaries = self.field.boundaries();
-        let origin = Dual::constant(excitation.time(k));
-        let pairs = boundaries.windows(2);
-        pairs
-            .map(|w| {
-                (
-                    origin.plus(h, &w[0]),
-                    Dual::constant(0.0).plus(h, &w[1]).plus(-h, &w[0]),
-                )
-            })
-            .collect()
-    }
-
     /// To the next sample by matrices, where the plant is linear in its states; false where it is not.
     pub(crate) fn propagate(&mut self, k: usize, excitation: &Excitation) -> bool {
         let Some(propagator) = &mut self.propagator else {
@@ -99,13 +85,16 @@ impl<const M: usize> Integrator<'_, M> {
         true
     }
 
-    /// Begins a part of a sample, by its place among the parts.
-    pub(crate) fn begin_part(&mut self, start: &Dual<M>, part: usize) {
-        if self.field.tape.delays.is_empty() {
-            return; // evaluated with the sample
+    /// Begins a part of the sample at an instant, by its place among the parts; its start and length.
+    pub(crate) fn begin_part(&mut self, part: usize, sample: f64) -> (Dual<M>, Dual<M>) {
+        let (mut start, length) = self.parts[part];
+        start.value += sample;
+        // Without delays it was evaluated with the sample.
+        if !self.field.tape.delays.is_empty() {
+            self.field.part(Some(part));
+            self.field.evaluate(&start, &self.x, &mut self.first);
         }
-        self.field.part(Some(part));
-        self.field.evaluate(start, &self.x, &mut self.first);
+        (start, length)
     }
 
     pub(crate) fn replay(
@@ -115,9 +104,8 @@ impl<const M: usize> Integrator<'_, M> {
         steps: &mut impl Iterator<Item = u8>,
         scale: &[f64],
     ) {
-        let parts = self.parts(k, excitation);
-        for (part, (start, length)) in parts.iter().enumerate() {
-            self.begin_part(start, part);
+        for part in 0..self.parts.len() {
+            let (start, length) = &self.begin_part(part, excitation.time(k));
             let mut place = 0u32;
             while place < 1 << FINEST {
                 let Some(step) = steps.next() else { return };

@@ -6,7 +6,6 @@
 
 mod dense;
 mod dual;
-mod execute;
 mod field;
 mod frozen;
 mod integrator;

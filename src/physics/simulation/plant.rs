@@ -397,6 +397,7 @@ impl Plant {
             .then(|| Propagator::new(&mut field, x.len(), excitation.sample_time, excitation.hold));
         Integrator {
             propagator,
+            parts: field.parts(),
             field,
             stages: Stages::new(x.len()),
             first: room.clone(),

@@ -221,10 +221,9 @@ impl<'p> StepControl<'p> {
             }
         }
         self.samples = k + 1;
-        let parts = integrator.parts(k, excitation);
-        for (part, (start, length)) in parts.iter().enumerate() {
-            integrator.begin_part(start, part);
-            self.part(integrator, start, length)?;
+        for part in 0..integrator.parts.len() {
+            let (start, length) = integrator.begin_part(part, excitation.time(k));
+            self.part(integrator, &start, &length)?;
         }
         Ok(())
     }

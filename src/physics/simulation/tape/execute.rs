@@ -1,8 +1,8 @@
 //! Value and slopes of one instruction of a tape.
 
-use super::dual::{Dual, combined, scaled};
-use super::tape::{Frame, Instruction, Operation};
+use super::{CurveSlots, Frame, Instruction, Operation};
 use crate::physics::expression::{Binary, Function};
+use crate::physics::simulation::dual::{Dual, combined, scaled};
 
 /// Position on the ramp from 0 (`z` below `-width`) to 1 (above `width`), and its slope: a cubic, whose slope is continuous,
 /// so that few steps integrate it.
@@ -61,11 +61,40 @@ impl<const M: usize> Operands<'_, M> {
         };
         Dual { value, slope }
     }
+
+    /// A curve of straight pieces where its argument is `z`; level beyond the ends.
+    #[inline(always)]
+    fn curve(&self, curve: &CurveSlots, z: f64) -> Dual<M> {
+        let knots = &curve.knots;
+        let last = knots.len() - 1;
+        let after = knots.partition_point(|k| *k <= z).clamp(1, last);
+        let width = knots[after] - knots[after - 1];
+        let part = ((z - knots[after - 1]) / width).clamp(0.0, 1.0);
+        let (low, high) = (curve.values[after - 1], curve.values[after]);
+        let (a, b) = (self.value(low), self.value(high));
+        let mut slope = if self.x.active[1] {
+            combined(1.0 - part, self.slope(low), part, self.slope(high))
+        } else {
+            [0.0; M]
+        };
+        let inside = z > knots[0] && z < knots[last];
+        if self.x.active[0] && inside {
+            slope = combined(1.0, &slope, (b - a) / width, self.slope(self.x.a));
+        }
+        Dual {
+            value: (1.0 - part) * a + part * b,
+            slope,
+        }
+    }
 }
 
 /// Value and slope of one instruction.
 #[inline(always)]
-pub(super) fn execute<const M: usize>(x: &Instruction, frame: &Frame<M>) -> Dual<M> {
+pub(super) fn execute<const M: usize>(
+    x: &Instruction,
+    frame: &Frame<M>,
+    curves: &[CurveSlots],
+) -> Dual<M> {
     let of = Operands { x, frame };
     let (a, b) = (of.value(x.a), of.value(x.b));
     match x.operation {
@@ -181,6 +210,7 @@ pub(super) fn execute<const M: usize>(x: &Instruction, frame: &Frame<M>) -> Dual
                 }
             }
         }
+        Operation::Curve(index) => of.curve(&curves[index as usize], a),
         Operation::Call(f) => match f {
             Function::Sin => of.one(a.sin(), a.cos()),
             Function::Cos => of.one(a.cos(), -a.sin()),

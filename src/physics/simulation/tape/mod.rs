@@ -8,13 +8,21 @@
 //! makes the derivative of the time of a switch part of the ordinary forward derivative, and sticking an ordinary stiff
 //! equation.
 
+mod execute;
+mod straight_pieces;
+
+use std::collections::HashMap;
+
+use pulp::Arch;
+
+use self::execute::execute;
+use self::straight_pieces::{StraightPieces, straight_pieces};
 use super::dual::Dual;
-use super::execute::execute;
 use crate::physics::expression::{Binary, ExpressionId, Function, Node, VariableId};
 use crate::physics::spec::{ModelSpec, Unknown, VariableKind};
 
 /// What an instruction does with its operands.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Operation {
     Negate,
     Not,
@@ -34,6 +42,8 @@ pub(super) enum Operation {
     },
     /// `if a then b else c`
     If,
+    /// A curve of straight pieces at `a`; its index.
+    Curve(u32),
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -44,6 +54,14 @@ pub(super) struct Instruction {
     pub(super) c: u32,
     /// Whether each operand, and so the result, can have a derivative.
     pub(super) active: [bool; 3],
+}
+
+/// A curve of straight pieces.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CurveSlots {
+    knots: Vec<f64>,
+    /// Slots of the values at the knots.
+    values: Vec<u32>,
 }
 
 /// What a slot depends on.
@@ -82,6 +100,9 @@ pub(super) struct MemorySlots {
 #[derive(Debug, Clone)]
 pub(super) struct Tape {
     instructions: Vec<Instruction>,
+    curves: Vec<CurveSlots>,
+    /// Instructions of the processor for several numbers at once.
+    pub(super) arch: Arch,
     /// Expression each slot computes, for messages.
     sources: Vec<Option<ExpressionId>>,
     /// First instruction of the levels `Inputs` and `States`.
@@ -142,6 +163,9 @@ struct Builder<'a> {
     sources: Vec<Option<ExpressionId>>,
     literals: Vec<(u32, f64)>,
     instructions: Vec<(u32, Instruction)>,
+    /// Slots of operations on the same operands, which are computed once.
+    known: HashMap<(Operation, [u32; 3]), u32>,
+    curves: Vec<CurveSlots>,
     switches: Vec<SwitchSlots>,
     delays: Vec<DelaySlots>,
     memories: Vec<(VariableId, u32)>,
@@ -174,6 +198,9 @@ impl Builder<'_> {
         operands: [u32; 3],
         source: Option<ExpressionId>,
     ) -> u32 {
+        if let Some(&slot) = self.known.get(&(operation, operands)) {
+            return slot;
+        }
         let used = operands.iter().filter(|&&o| o != NONE);
         let level = used
             .clone()
@@ -194,6 +221,7 @@ impl Builder<'_> {
                 active,
             },
         ));
+        self.known.insert((operation, operands), slot);
         slot
     }
 
@@ -206,9 +234,13 @@ impl Builder<'_> {
     fn switch(&mut self, a: u32, b: u32) -> u32 {
         let at = |o: u32, of: &[bool]| o != NONE && of[o as usize];
         let moves = |o: u32, level: &[Level]| o != NONE && level[o as usize] == Level::States;
+        let operands = (a as usize, (b != NONE).then_some(b as usize));
+        if let Some(known) = (self.switches.iter()).position(|s| (s.a, s.b) == operands) {
+            return known as u32;
+        }
         self.switches.push(SwitchSlots {
-            a: a as usize,
-            b: (b != NONE).then_some(b as usize),
+            a: operands.0,
+            b: operands.1,
             of_states: at(a, &self.of_states) || at(b, &self.of_states),
             moves: moves(a, &self.level) || moves(b, &self.level),
         });
@@ -225,18 +257,60 @@ impl Builder<'_> {
                 continue;
             }
             let node = self.spec.expressions.node(id);
-            let missing: Vec<_> = node
-                .operands()
-                .filter(|o| self.of_node[o.index()] == NONE)
-                .collect();
+            let curve = straight_pieces(&self.spec.expressions, id);
+            let operands: Vec<ExpressionId> = match &curve {
+                Some(curve) => [&curve.rest, &curve.values, &vec![curve.argument]]
+                    .into_iter()
+                    .flatten()
+                    .copied()
+                    .collect(),
+                None => node.operands().collect(),
+            };
+            let missing = (operands.into_iter()).filter(|o| self.of_node[o.index()] == NONE);
+            let missing: Vec<ExpressionId> = missing.collect();
             if missing.is_empty() {
-                self.of_node[id.index()] = self.node(id, node);
+                self.of_node[id.index()] = match curve {
+                    Some(curve) => self.curve(curve, id),
+                    None => self.node(id, node),
+                };
                 stack.pop();
             } else {
                 stack.extend(missing);
             }
         }
         self.of_node[root.index()]
+    }
+
+    /// A curve of straight pieces, and what it is added to.
+    fn curve(&mut self, curve: StraightPieces, id: ExpressionId) -> u32 {
+        let argument = self.of_node[curve.argument.index()];
+        let values: Vec<u32> = (curve.values.iter())
+            .map(|v| self.of_node[v.index()])
+            .collect();
+        let operation = Operation::Curve(self.curves.len() as u32);
+        // Of the values those decide of what the curve depends on that depend on most.
+        let of_values = (values.iter().copied())
+            .max_by_key(|&v| (self.level[v as usize], self.active[v as usize]));
+        let any = |of: &[bool]| values.iter().any(|&v| of[v as usize]);
+        let (active, of_states) = (any(&self.active), any(&self.of_states));
+        let slot = self.emit(
+            operation,
+            [argument, of_values.unwrap_or(NONE), NONE],
+            Some(id),
+        );
+        self.active[slot as usize] |= active;
+        self.of_states[slot as usize] |= of_states;
+        if let Some((_, instruction)) = self.instructions.last_mut() {
+            instruction.active[1] = active;
+        }
+        self.curves.push(CurveSlots {
+            knots: curve.knots,
+            values,
+        });
+        curve.rest.iter().fold(slot, |sum, term| {
+            let term = self.of_node[term.index()];
+            self.emit(Operation::Binary(Binary::Add), [sum, term, NONE], Some(id))
+        })
     }
 
     fn node(&mut self, id: ExpressionId, node: Node) -> u32 {
@@ -332,6 +406,8 @@ impl Tape {
             sources: Vec::new(),
             literals: Vec::new(),
             instructions: Vec::new(),
+            known: HashMap::new(),
+            curves: Vec::new(),
             switches: Vec::new(),
             delays: Vec::new(),
             memories: Vec::new(),
@@ -460,9 +536,20 @@ impl Tape {
     }
 
     fn run<const M: usize>(&self, range: std::ops::Range<usize>, frame: &mut Frame<M>) {
+        if M < 2 {
+            return self.sweep(range, frame);
+        }
+        self.arch.dispatch(
+            #[inline(always)]
+            || self.sweep(range, frame),
+        );
+    }
+
+    #[inline(always)]
+    fn sweep<const M: usize>(&self, range: std::ops::Range<usize>, frame: &mut Frame<M>) {
         let first = self.leaves + range.start;
         for (i, x) in self.instructions[range].iter().enumerate() {
-            frame.slot[first + i] = execute(x, frame);
+            frame.slot[first + i] = execute(x, frame, &self.curves);
         }
     }
 }
@@ -516,6 +603,13 @@ impl Builder<'_> {
                     ..x
                 })
                 .collect(),
+            curves: (self.curves.into_iter())
+                .map(|c| CurveSlots {
+                    values: c.values.into_iter().map(to).collect(),
+                    ..c
+                })
+                .collect(),
+            arch: Arch::new(),
             sources,
             bounds,
             leaves: leaves.len(),
