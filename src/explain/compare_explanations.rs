@@ -27,6 +27,29 @@ pub(crate) fn is_doubtful(explanation: &Explanation) -> bool {
         }
 }
 
+/// Whether an explanation relative to a linear simulator needs no second opinion: it found nothing, or a listed effect.
+pub(crate) fn is_sure(explanation: &Explanation) -> bool {
+    match explanation.verdict {
+        Verdict::Consistent | Verdict::Parameters => true,
+        Verdict::Named | Verdict::Family => !is_law(explanation),
+        Verdict::Unexplained => false,
+    }
+}
+
+fn is_law(explanation: &Explanation) -> bool {
+    explanation.effects.iter().any(|e| e.effect == "law")
+}
+
+/// Whether an explanation by the equations of a linear simulator replaces one that is not sure: it names what the other does not, or
+/// a listed effect where the other has a law, and follows the recording as closely.
+pub(crate) fn replaces(equations: &Explanation, other: &Explanation) -> bool {
+    let more = match other.verdict {
+        Verdict::Unexplained => stands_in(equations, other),
+        _ => !is_law(equations) && error_over(equations, other).is_some_and(|e| e <= 1.0 + EQUAL),
+    };
+    equations.verdict == Verdict::Named && more
+}
+
 /// Takes back what is not sure of a doubtful explanation.
 pub(crate) fn doubt(explanation: &mut Explanation) {
     if !matches!(explanation.verdict, Verdict::Named | Verdict::Family) {
@@ -136,6 +159,29 @@ mod tests {
         assert!(!stands_in(&run(1.1, true), &linear));
         assert!(!stands_in(&run(0.9, false), &linear));
         assert!(stands_in(&run(0.5, false), &linear));
+
+        // A second opinion.
+        let with = |error: f64, verdict: Verdict, id: &str| {
+            let mut e = run(error, true);
+            e.verdict = verdict;
+            e.effects[0].effect = id.to_owned();
+            e
+        };
+        let drag = with(0.9, Verdict::Named, "quadratic_drag");
+        let law = with(1.0, Verdict::Named, "law");
+        let unexplained = with(1.0, Verdict::Unexplained, "hysteresis");
+        assert!(!is_sure(&law) && !is_sure(&unexplained) && is_sure(&drag));
+        assert!(is_sure(&with(1.0, Verdict::Parameters, "law")));
+        assert!(replaces(&drag, &law) && !replaces(&law, &law));
+        assert!(!replaces(
+            &with(1.1, Verdict::Named, "quadratic_drag"),
+            &law
+        ));
+        assert!(replaces(&drag, &unexplained) && replaces(&law, &unexplained));
+        assert!(!replaces(
+            &with(0.1, Verdict::Unexplained, "law"),
+            &unexplained
+        ));
 
         assert!(agree(&run(1.1, true), &linear));
         let mut other = run(1.1, true);

@@ -1,7 +1,7 @@
 //! The question about a linear model or columns: the ways of answering it, and the choice between their answers.
 
 use super::columns;
-use super::compare_explanations::{agree, doubt, is_doubtful, stands_in};
+use super::compare_explanations::{agree, doubt, is_doubtful, is_sure, replaces, stands_in};
 use super::document::explain_error::ExplainError;
 use super::effects::{self, Definition};
 use super::explanation::{Explanation, Verdict};
@@ -66,7 +66,10 @@ pub fn explain(
     // The data before the physics: from here on they are as repaired.
     let checked = Checked::new(recordings, simulation, &allowed_id);
     match know(&checked)? {
-        Simulator::Linear(known) => explain_linear(*known, &checked, &allowed, options.seed),
+        Simulator::Linear(known) => {
+            let explanation = explain_linear(*known, &checked, &allowed, options.seed)?;
+            Ok(second_opinion(explanation, &checked, options))
+        }
         Simulator::Nonlinear(simulator) => {
             explain_nonlinear(&simulator, &checked, &allowed, options)
         }
@@ -117,6 +120,22 @@ fn explain_linear(
         (None, None) => return Err(no_fit(checked)),
     };
     Ok(said(&known, checked, (finding, mask), seed))
+}
+
+/// An answer that is not sure is compared with that of the equations that reproduce the simulated outputs.
+fn second_opinion(explanation: Explanation, checked: &Checked, options: &Options) -> Explanation {
+    if !checked.troubles.is_empty() || is_sure(&explanation) {
+        return explanation;
+    }
+    let by_equations = || {
+        let equations = columns::equations(checked)?;
+        if equations.misfit > columns::REPRODUCED {
+            return None;
+        }
+        columns::explain_equations(&equations, checked, &options.without)
+    };
+    let other = by_equations().filter(|other| replaces(other, &explanation));
+    other.unwrap_or(explanation)
 }
 
 /// A free decay: no linear model has states that its inputs do not reach, so that equations are the only way.

@@ -7,7 +7,7 @@ use crate::explain::linear::check::Checked;
 use crate::explain::plant_answer::{PlantOptions, explain_plant};
 use crate::explain::simulation::Simulation;
 use crate::identify::Recording;
-use crate::log::Log;
+use crate::log::{Log, counted};
 use crate::physics::estimate::PlantRecording;
 
 /// Equations in place of the simulated columns; none where no equations reproduce them.
@@ -61,8 +61,8 @@ pub(crate) fn explain_equations(
     };
     let mut explanation = explain_plant(&found.plant, &logs, recordings, &options).ok()?;
     explanation.summary.push(format!(
-        "The simulated outputs follow equations with {} states, to {:.2} % of what the recording differs by; these were changed.",
-        found.plant.spec.states().len(),
+        "The simulated outputs follow equations with {}, to {:.2} % of what the recording differs by; these were changed.",
+        counted(found.plant.spec.states().len(), "state"),
         100.0 * found.misfit
     ));
     if let Some(plant) = &mut explanation.plant {

@@ -52,9 +52,30 @@ enum Domain {
 struct Form {
     text: &'static str,
     value: fn(f64, f64) -> f64,
+    /// Of the first argument.
     domain: Domain,
-    /// Two arguments; of two outputs only.
-    pair: Option<bool>,
+    /// None for a function of one argument.
+    pair: Option<Pair>,
+}
+
+/// What a function of two arguments is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Pair {
+    /// Any two, in either order the same.
+    Any,
+    /// Two outputs, in either order the same.
+    Outputs,
+    /// An output that the domain admits, and anything else.
+    OutputAnd,
+}
+
+const fn two(text: &'static str, value: fn(f64, f64) -> f64, domain: Domain, pair: Pair) -> Form {
+    Form {
+        text,
+        value,
+        domain,
+        pair: Some(pair),
+    }
 }
 
 const fn one(text: &'static str, value: fn(f64, f64) -> f64, domain: Domain) -> Form {
@@ -67,7 +88,7 @@ const fn one(text: &'static str, value: fn(f64, f64) -> f64, domain: Domain) -> 
 }
 
 /// Nonlinear functions that the right-hand sides of simulators are made of.
-const FORMS: [Form; 10] = [
+const FORMS: [Form; 16] = [
     one("{a}*abs({a})", |a, _| a * a.abs(), Domain::Any),
     one("{a}^2", |a, _| a * a, Domain::Signed),
     one("{a}^3", |a, _| a.powi(3), Domain::Any),
@@ -84,18 +105,51 @@ const FORMS: [Form; 10] = [
         |a, _| a.max(1e-9).recip(),
         Domain::Positive,
     ),
-    Form {
-        text: "{a}*{b}",
-        value: |a, b| a * b,
-        domain: Domain::Any,
-        pair: Some(false),
-    },
-    Form {
-        text: "sign({a} - {b})*sqrt(abs({a} - {b}))",
-        value: |a, b| (a - b).signum() * (a - b).abs().sqrt(),
-        domain: Domain::Any,
-        pair: Some(true),
-    },
+    // The outflow of a cone.
+    one(
+        "1/max({a}, 1e-9)^1.5",
+        |a, _| a.max(1e-9).powf(-1.5),
+        Domain::Positive,
+    ),
+    two("{a}*{b}", |a, b| a * b, Domain::Any, Pair::Any),
+    two(
+        "sign({a} - {b})*sqrt(abs({a} - {b}))",
+        |a, b| (a - b).signum() * (a - b).abs().sqrt(),
+        Domain::Any,
+        Pair::Outputs,
+    ),
+    // A valve at a pressure or level, and what is shared by an amount, by a level and its square.
+    two(
+        "{b}*sqrt(max({a}, 0))",
+        |a, b| b * a.max(0.0).sqrt(),
+        Domain::Positive,
+        Pair::OutputAnd,
+    ),
+    two(
+        "{b}/max({a}, 1e-9)",
+        |a, b| b / a.max(1e-9),
+        Domain::Positive,
+        Pair::OutputAnd,
+    ),
+    two(
+        "{b}/max({a}, 1e-9)^2",
+        |a, b| b / a.max(1e-9).powi(2),
+        Domain::Positive,
+        Pair::OutputAnd,
+    ),
+    // Components of what acts on a body that turns.
+    two(
+        "{b}*sin({a})",
+        |a, b| b * a.sin(),
+        Domain::Angle,
+        Pair::OutputAnd,
+    ),
+    two(
+        "{b}*cos({a})",
+        |a, b| b * a.cos(),
+        Domain::Angle,
+        Pair::OutputAnd,
+    ),
 ];
 
 /// Text of a form with its arguments.
@@ -248,6 +302,11 @@ impl Regressors {
     }
 }
 
+/// Whether `rate` is the derivative of `a`: its product with a function of `a` is the derivative of another one.
+fn is_rate_of(rate: Part, a: Part) -> bool {
+    matches!((rate, a), (Part::Rate(i), Part::Output(j)) if i == j)
+}
+
 fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
         (a.min(v), b.max(v))
@@ -276,35 +335,37 @@ impl Signals {
             parts.extend([Part::Output(j), Part::Rate(j)]);
         }
         parts.extend((0..inputs).map(Part::Input));
+        let moves = |a: Part| {
+            let (least, most) = of(a);
+            most > least
+        };
+        let admits = |domain: Domain, a: Part| {
+            let (least, most) = of(a);
+            let output = matches!(a, Part::Output(_));
+            match domain {
+                Domain::Any => true,
+                Domain::Signed => least < 0.0 && most > 0.0,
+                Domain::Positive => output && least > -POSITIVE * (most - least),
+                Domain::Angle => output && (ANGLE.0..ANGLE.1).contains(&(most - least)),
+            }
+        };
+        parts.retain(|&a| moves(a));
         for (form, of_form) in FORMS.iter().enumerate() {
             for (i, &a) in parts.iter().enumerate() {
-                let (least, most) = of(a);
-                let moves = most > least;
+                if !admits(of_form.domain, a) {
+                    continue;
+                }
+                let second = |b: &Part| match of_form.pair {
+                    Some(Pair::Outputs) => matches!((a, *b), (Part::Output(_), Part::Output(_))),
+                    Some(Pair::OutputAnd) => a != *b && !is_rate_of(*b, a),
+                    _ => true,
+                };
                 match of_form.pair {
-                    None => {
-                        let fits = match of_form.domain {
-                            Domain::Any => true,
-                            Domain::Signed => least < 0.0 && most > 0.0,
-                            Domain::Positive => {
-                                matches!(a, Part::Output(_)) && least > -POSITIVE * (most - least)
-                            }
-                            Domain::Angle => {
-                                matches!(a, Part::Output(_))
-                                    && (ANGLE.0..ANGLE.1).contains(&(most - least))
-                            }
-                        };
-                        if moves && fits {
-                            all.push(Signal::Function(form, vec![a]));
-                        }
-                    }
-                    Some(of_outputs) => {
-                        for &b in &parts[i + 1..] {
-                            let two = matches!((a, b), (Part::Output(_), Part::Output(_)));
-                            let (low, high) = of(b);
-                            if moves && high > low && (two || !of_outputs) {
-                                all.push(Signal::Function(form, vec![a, b]));
-                            }
-                        }
+                    None => all.push(Signal::Function(form, vec![a])),
+                    Some(pair) => {
+                        let from = if pair == Pair::OutputAnd { 0 } else { i + 1 };
+                        let others = parts[from..].iter().copied().filter(second);
+                        all.extend(others.map(|b| Signal::Function(form, vec![a, b])));
                     }
                 }
             }

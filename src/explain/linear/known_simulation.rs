@@ -15,7 +15,7 @@ use super::nonlinear_simulator::NonlinearSimulator;
 use crate::explain::document::explain_error::ExplainError;
 use crate::explain::simulation::Simulation;
 use crate::identify::Model;
-use crate::log::{Channel, LARGEST_SIZE, Log};
+use crate::log::{Channel, LARGEST_SIZE, Log, counted};
 use crate::physics::{Comparison, compare, rounded};
 
 /// What a simulation turns out to be.
@@ -99,11 +99,6 @@ fn check_sizes(log: &Log) -> Result<(), ExplainError> {
         }
     }
     Ok(())
-}
-
-/// "1 input", "2 inputs".
-fn counted(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 fn of_model(recordings: &[Log], model: &Model, name: &str) -> Result<Known, ExplainError> {

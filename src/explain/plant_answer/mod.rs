@@ -5,6 +5,7 @@ mod free_runs;
 mod hypotheses;
 mod judgement;
 mod location;
+mod nearest_to_text;
 mod plant_effects;
 mod plant_summary;
 mod question;
@@ -20,6 +21,7 @@ use nalgebra::DMatrix;
 use self::judgement::free_run::is_astray;
 use self::judgement::joint_test::joint_test;
 use self::judgement::stated_probability::probability;
+use self::nearest_to_text::nearest_to_text;
 use self::plant_summary::{Differs, Told, as_good};
 use self::where_to_look::experiment;
 use self::within_bounds::within_bounds;
@@ -63,18 +65,27 @@ pub fn explain_plant(
     };
     let hold = options.hold;
     let recordings: Vec<PlantRecording> = logs.iter().map(PlantRecording::from).collect();
-    let found = select(plant, &recordings, hold, &scope)?;
+    let mut found = select(plant, &recordings, hold, &scope)?;
     let base_options = EstimateOptions {
         free: vec![true; plant.spec.parameters().len()],
         ..found.options.clone()
     };
     let whole =
         Study::new(&found.plant, &recordings, &found.options)?.with_information(found.information);
-    let covariance = whole.covariance(&found.fit);
+    let base = Study::new(plant, &recordings, &base_options)?;
+    let mut covariance = whole.covariance(&found.fit);
+    let mut steps = found.steps.iter().take(found.accepted);
+    if steps.any(|s| s.first().is_some_and(|f| f.lead.curve.is_some())) {
+        let text = &base.nominal()[..base.parameters()];
+        let before = base.covariance(&found.baseline);
+        if let Some(nearest) = nearest_to_text(&whole, &found.fit, &covariance, text, &before) {
+            (found.fit, covariance) = nearest;
+        }
+    }
     let answer = Answer {
         plant,
         recordings: &recordings,
-        base: Study::new(plant, &recordings, &base_options)?,
+        base,
         within_bounds: within_bounds(&plant.spec, covariance.clone()),
         covariance,
         whole,

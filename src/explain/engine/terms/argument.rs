@@ -305,7 +305,7 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
             }
         }
     }
-    // Bodies radiate to each other, and a single one to a room.
+    // Bodies radiate to each other, and each to a room.
     let fourth = |v: VariableId| match spec.variable(v).unit_text.as_deref() {
         Some("K") => Some(format!("({}/100)^4", name(v))),
         Some("degC") => Some(format!("(({} + 273.15)/100)^4", name(v))),
@@ -321,9 +321,7 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
         for (b, of_b) in &warm[i + 1..] {
             radiation.push((format!("({of_a} - {of_b})"), vec![*a, *b]));
         }
-        if warm.len() == 1 {
-            radiation.push((format!("({of_a} - {ROOM})"), vec![*a]));
-        }
+        radiation.push((format!("({of_a} - {ROOM})"), vec![*a]));
     }
     found.extend(radiation.into_iter().map(|(text, variables)| {
         let mut argument = Argument::new(spec, text, variables);

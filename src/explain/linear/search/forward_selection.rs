@@ -152,7 +152,10 @@ pub(crate) fn with_feedthrough(problem: &Problem, fit: &Fit) -> Option<Fit> {
     theta.splice(at..at, d);
     let direct = Fit::run(problem, structure, theta, Some(&fit.noise), Effort::FINAL)?;
     let count = problem.count();
-    (direct.criterion(count) < fit.criterion(count) - FEEDTHROUGH_GAIN).then_some(direct)
+    // A controller that acts within the sample leaves no other sign: what its output tells of the noise of now makes innovations
+    // smaller, and the error of the simulation larger.
+    let closer = problem.mean_square(&direct.residual) < problem.mean_square(&fit.residual);
+    (closer && direct.criterion(count) < fit.criterion(count) - FEEDTHROUGH_GAIN).then_some(direct)
 }
 
 /// Whether the residual foretells the inputs: its whitened values correlate with later innovations of an input.

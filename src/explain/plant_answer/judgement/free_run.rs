@@ -41,6 +41,9 @@ fn is_unstable(plant: &Plant, study: &Study, fit: &Fit, recordings: &[PlantRecor
     let Some(trajectories) = study.trajectories(fit) else {
         return true;
     };
+    if plant.spec.states().is_empty() {
+        return false;
+    }
     let points = study.points(fit);
     let mut each = trajectories.iter().zip(recordings).zip(points);
     each.any(|((trajectory, recording), point)| {
