@@ -65,7 +65,7 @@ pub(crate) fn doubt(explanation: &mut Explanation) {
     };
     explanation.summary.insert(
         0,
-        format!("The simulator is not linear, and no equations were found that reproduce its columns: {said}"),
+        format!("The simulator is not linear, and no equations were found that reproduce its columns closely: {said}"),
     );
 }
 

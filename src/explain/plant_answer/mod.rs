@@ -26,7 +26,7 @@ use self::plant_summary::{Differs, Told, as_good};
 use self::where_to_look::experiment;
 use self::within_bounds::within_bounds;
 
-use super::engine::fitting::fitted::Fitted;
+use super::engine::fitting::fitted::{Fitted, tie_with_curve};
 use super::engine::fitting::initial_states::with_free_states;
 use super::engine::holdout::{EXPLAINED, blocks};
 use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
@@ -78,7 +78,8 @@ pub fn explain_plant(
     if steps.any(|s| s.first().is_some_and(|f| f.lead.curve.is_some())) {
         let text = &base.nominal()[..base.parameters()];
         let before = base.covariance(&found.baseline);
-        if let Some(nearest) = nearest_to_text(&whole, &found.fit, &covariance, text, &before) {
+        let slack = tie_with_curve(found.baseline.deviance - found.fit.deviance);
+        if let Some(nearest) = nearest_to_text(&whole, &found.fit, text, &before, slack) {
             (found.fit, covariance) = nearest;
         }
     }

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::deviance::{Deviance, Slopes};
 use super::free_run::{follows, left, white_fit_holding};
 use super::observer::{self, unbounded};
-use super::optimise::{Effort, minimise};
+use super::optimise::{Effort, Range, minimise};
 use super::problem::{EstimateError, PlantRecording, Problem, penalty};
 use super::{EstimateOptions, Fit, Form, SEARCH, best_fit};
 use crate::noise::{Colours, Mask, Noise, Series, effective_samples};
@@ -134,17 +134,22 @@ impl<'a> Study<'a> {
 
     /// A fit from a point with the noise and the observer of another: a first comparison of candidates.
     pub(crate) fn glance(&self, from: &Fit, effort: Effort) -> Option<Fit> {
-        self.fit_from(from, 0, effort, (Slopes::Frozen, true))
+        self.fit_from(from, 0, effort, (Slopes::Frozen, true), &[])
     }
 
     /// The same with an observer and a noise model of its own.
     pub(crate) fn compare(&self, from: &Fit, effort: Effort) -> Option<Fit> {
-        self.fit_from(from, 1, effort, (Slopes::Frozen, false))
+        self.fit_from(from, 1, effort, (Slopes::Frozen, false), &[])
     }
 
     /// A fit from a point with the noise of another, and then `rounds` times with a noise model of its own.
     pub(crate) fn refit(&self, from: &Fit, rounds: usize, effort: Effort) -> Option<Fit> {
-        self.fit_from(from, rounds, effort, (Slopes::FrozenFirst, false))
+        self.fit_from(from, rounds, effort, (Slopes::FrozenFirst, false), &[])
+    }
+
+    /// A fit from a point with the noise of another, and with some of the numbers held where they are.
+    pub(crate) fn holding(&self, from: &Fit, held: &[usize], effort: Effort) -> Option<Fit> {
+        self.fit_from(from, 0, effort, (Slopes::FrozenFirst, false), held)
     }
 
     fn fit_from(
@@ -153,10 +158,18 @@ impl<'a> Study<'a> {
         rounds: usize,
         effort: Effort,
         (slopes, gain_held): (Slopes, bool),
+        held: &[usize],
     ) -> Option<Fit> {
         let mut point = from.point.clone();
         let mut ranges = self.problem.ranges();
         ranges.extend(unbounded(point.len() - ranges.len()));
+        for &i in held {
+            ranges[i] = Range {
+                min: point[i],
+                max: point[i],
+                reach: 0.0,
+            };
+        }
         let mut objective = Deviance::new(&self.problem, from.form, from.noise.clone());
         objective.gain_held = gain_held;
         objective.slopes = slopes;

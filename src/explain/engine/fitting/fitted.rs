@@ -13,6 +13,11 @@ pub(crate) const TIE: (f64, f64) = (6.0, 0.08);
 /// The same where the best is a curve: it is free to follow any effect (math/physics.md, "Fits and decision"). The first also
 /// where it is an unlisted formula.
 const TIE_WITH_CURVE: (f64, f64) = (12.0, 0.04);
+
+/// Gains that differ by less than this from one of a curve are equal to it.
+pub(crate) fn tie_with_curve(gain: f64) -> f64 {
+    TIE_WITH_CURVE.0.max(TIE_WITH_CURVE.1 * gain)
+}
 /// Deviances that differ by less are equal: two, as Akaike's criterion has it for a number that says nothing.
 const ALIKE: f64 = 2.0;
 /// A gain must not rest on so few values: they may be errors of the recording.
@@ -127,7 +132,7 @@ pub(in crate::explain::engine) fn searched(lead: &Lead, recordings: &[PlantRecor
 /// A form with more numbers than the special case that it contains follows errors of both: it must gain clearly more.
 fn prefer_special_case(spec: &ModelSpec, fitted: &mut [Fitted]) {
     let Some(first) = fitted.first() else { return };
-    let tie = TIE_WITH_CURVE.0.max(TIE_WITH_CURVE.1 * first.gain);
+    let tie = tie_with_curve(first.gain);
     let least = first.gain - tie;
     if let Some(wanted) = special_case(named(spec, first))
         && let Some(at) = fitted.iter().position(|f| {

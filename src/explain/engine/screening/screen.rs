@@ -500,7 +500,7 @@ fn peaks(study: &Study, fit: &Fit, recordings: &[PlantRecording]) -> Vec<f64> {
 fn distinct(leads: Vec<Lead>, spec: &ModelSpec, arguments: &[Argument]) -> Vec<Lead> {
     let rank = |l: &Lead| {
         let variables = l.argument.map_or(&[][..], |a| &arguments[a].variables);
-        rank_of(spec, l.term, l.place, variables)
+        (rank_of(spec, l.term, l.place, variables), variables.len())
     };
     let mut kept: Vec<Lead> = Vec::new();
     for lead in leads {

@@ -1,5 +1,7 @@
 //! Decides: consistent, parameters, named, family or unexplained.
 
+use rayon::prelude::*;
+
 use crate::explain::effects::{self, Definition};
 use crate::explain::explanation::Verdict;
 use crate::explain::linear::check::coarse_sensor;
@@ -240,6 +242,9 @@ pub(crate) fn inquire(
         crate::explain::linear::search::rectified_sensor::candidates(&problem, structure, allowed),
     );
     ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let of_one = in_one_recording_each(&problem, &ranked, base);
+    ranked.extend(of_one);
+    ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     finding.rivals = rivals(&ranked, base);
     finding.detectable = detectable(&problem, &ranked);
     let needed = NEEDED;
@@ -384,6 +389,37 @@ fn output_error_refit(problem: &Problem) -> Option<Structure> {
     })
 }
 
+/// Effects that are tried in one recording only: those that explain most of all of them.
+const IN_ONE: usize = 6;
+
+/// The best effects, best first in `ranked`, in one recording only, where that explains all of them better: what acts in one
+/// explains little of all, and another effect may come before it there.
+fn in_one_recording_each(problem: &Problem, ranked: &[Ranked], base: f64) -> Vec<Ranked> {
+    if problem.data.segments.len() < 2 {
+        return Vec::new();
+    }
+    let mut best: Vec<&Ranked> = Vec::new();
+    let definition = |r: &Ranked| r.fit.structure.new_effects()[0].definition.id;
+    for r in ranked {
+        let single = r.fit.structure.new_effects().len() == 1;
+        if best.len() < IN_ONE && single && best.iter().all(|b| definition(b) != definition(r)) {
+            best.push(r);
+        }
+    }
+    let count = problem.count();
+    let of_one = |r: &Ranked| {
+        let mut one = Ranked::new(problem, in_one_recording(problem, &r.fit)?);
+        one.criterion += penalty(&one, base, count) + chosen_among(problem);
+        sane(problem, &one.fit).then_some(one)
+    };
+    best.into_par_iter().filter_map(of_one).collect()
+}
+
+/// What the choice of a recording owes.
+fn chosen_among(problem: &Problem) -> f64 {
+    2.0 * (problem.data.segments.len() as f64).ln()
+}
+
 /// The effect of `fit` in one recording only, where that explains all of them significantly better: the others say that it
 /// is not there.
 fn in_one_recording(problem: &Problem, fit: &Fit) -> Option<Fit> {
@@ -392,8 +428,7 @@ fn in_one_recording(problem: &Problem, fit: &Fit) -> Option<Fit> {
         return None;
     }
     let count = problem.count();
-    // Which one is chosen among them.
-    let owed = 2.0 * (recordings as f64).ln();
+    let owed = chosen_among(problem);
     (0..recordings)
         .filter_map(|recording| {
             let structure = Structure {
