@@ -90,7 +90,7 @@ impl From<RunError> for EstimateError {
 pub(super) struct Problem<'a> {
     pub(super) plant: Arc<dyn Simulated>,
     pub(super) recordings: &'a [PlantRecording],
-    options: &'a EstimateOptions,
+    pub(super) options: &'a EstimateOptions,
     pub(super) mask: Mask,
     /// Places of the free parameters.
     pub(super) free: Vec<usize>,

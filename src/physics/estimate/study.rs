@@ -9,7 +9,7 @@ use super::optimise::{Effort, Range, minimise};
 use super::problem::{EstimateError, PlantRecording, Problem, penalty};
 use super::{EstimateOptions, Fit, Form, SEARCH, best_fit};
 use crate::noise::{Colours, Mask, Noise, Series, effective_samples};
-use crate::physics::simulation::{Observer, Plant, Point, Trajectory};
+use crate::physics::simulation::{Hold, Observer, Plant, Point, Trajectory};
 
 /// A free run whose error is more than twice that of an observer strays: the logarithm of the ratio of their variances.
 const STRAYS: f64 = 1.386;
@@ -196,6 +196,11 @@ impl<'a> Study<'a> {
         };
         let criterion = self.criterion(&fit);
         Some(Fit { criterion, ..fit })
+    }
+
+    /// What inputs do between samples.
+    pub(crate) fn hold(&self) -> Hold {
+        self.problem.options.hold
     }
 
     pub(crate) fn outputs(&self) -> usize {

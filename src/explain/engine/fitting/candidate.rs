@@ -316,7 +316,8 @@ mod tests {
         for (term, lifts) in (TERMS.iter()).flat_map(|t| [(t, [1.5, 0.0]), (t, [0.0, 1.5])]) {
             for (i, argument) in arguments.iter_mut().enumerate() {
                 let lift = lifts[i % 2];
-                argument.set(vec![(0..200).map(|k| wave(k) + lift).collect()]);
+                let values: Vec<Vec<f64>> = vec![(0..200).map(|k| wave(k) + lift).collect()];
+                argument.set(values.clone(), values);
             }
             let mut at: Vec<Place> = match term.port {
                 Port::Sensor => sensors(&spec).into_iter().map(Place::Equation).collect(),
@@ -367,7 +368,7 @@ mod tests {
         let mut arguments = arguments(&spec);
         arguments
             .iter_mut()
-            .for_each(|a| a.set(vec![vec![3.0; 50], vec![7.0; 50]]));
+            .for_each(|a| a.set(vec![vec![3.0; 50], vec![7.0; 50]], vec![]));
         let place = Place::Equation(sensors(&spec)[0]);
         let term = TERMS.iter().find(|t| t.id == "sensor_lag").unwrap();
         let shown = arguments.iter().position(|a| a.expression == "x");
@@ -406,7 +407,9 @@ mod tests {
         };
         let expected = run(&Plant::new(spec.clone()));
         let mut arguments = arguments(&spec);
-        arguments.iter_mut().for_each(|a| a.set(vec![wave.clone()]));
+        arguments
+            .iter_mut()
+            .for_each(|a| a.set(vec![wave.clone()], vec![wave.clone()]));
         let place = Place::Equation(sensors(&spec)[0]);
         for (id, shapes) in [
             ("sensor_lag", vec![0.02]),

@@ -113,17 +113,17 @@ pub(in crate::explain::engine) fn curves(
         let argument = &arguments[at];
         let hook = hooked.places.iter().position(|p| *p == place)?;
         let knots = knots(argument);
-        let signals: Vec<Series> = (0..knots.len())
+        let signals: Vec<[Series; 2]> = (0..knots.len())
             .map(|i| {
                 let of = |values: &Vec<f64>| values.iter().map(|&z| piece(&knots, i, z)).collect();
-                argument.values.iter().map(of).collect()
+                [&argument.values, &argument.ends].map(|each| each.iter().map(of).collect())
             })
             .collect();
         let (columns, products): (Vec<Vec<f64>>, Vec<DVector<f64>>) = signals
             .chunks(TOGETHER)
             .flat_map(|signals| {
-                let held = |signal| (signal, argument.held);
-                let entering: Vec<(&Series, bool)> = signals.iter().map(held).collect();
+                let entering: Vec<(&Series, &Series)> =
+                    signals.iter().map(|[at, end]| (at, end)).collect();
                 path.propagate(hooked.columns[hook], &entering)
             })
             .map(|series| {

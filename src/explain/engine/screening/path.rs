@@ -7,7 +7,7 @@ use crate::explain::engine::fitting::edit::{Edit, Place, places};
 use crate::explain::engine::terms::argument::Argument;
 use crate::noise::Series;
 use crate::physics::estimate::{Fit, PlantRecording, Study};
-use crate::physics::{LinearPlant, ModelSpec, Plant};
+use crate::physics::{Hold, LinearPlant, ModelSpec, Plant};
 
 /// Signals that are propagated together.
 pub(in crate::explain::engine) const TOGETHER: usize = 4;
@@ -170,7 +170,8 @@ pub(in crate::explain::engine) fn path(
     let trajectories = study.trajectories(fit)?;
     let l = study.outputs();
     let mut path = Path(vec![]);
-    let mut values: Vec<Vec<Vec<f64>>> = vec![Vec::new(); arguments.len()];
+    let mut values: Vec<[Series; 2]> = vec![Default::default(); arguments.len()];
+    let held = usize::from(study.hold() == Hold::Linear);
     let (gain, tested) = (study.gain(fit), study.gain(tested));
     for ((trajectory, recording), point) in
         trajectories.iter().zip(recordings).zip(study.points(fit))
@@ -180,13 +181,16 @@ pub(in crate::explain::engine) fn path(
         let m = hooked.plant.spec.inputs().len();
         let mut inputs = vec![0.0; m];
         let mut all = Vec::with_capacity(samples);
-        let mut of_arguments = vec![Vec::with_capacity(samples); arguments.len()];
+        let column = || Vec::with_capacity(samples);
+        let mut of_arguments: Vec<[Vec<f64>; 2]> =
+            arguments.iter().map(|_| [column(), column()]).collect();
+        let at = |k: usize| -> Vec<f64> { trajectory.states.iter().map(|x| x[k]).collect() };
+        let time = |k: usize| recording.start_time + k as f64 * recording.sample_time;
         for k in 0..samples {
-            let mut state: Vec<f64> = trajectory.states.iter().map(|x| x[k]).collect();
+            let mut state = at(k);
             for (to, u) in inputs.iter_mut().zip(&recording.inputs) {
                 *to = u[k];
             }
-            let time = recording.start_time + k as f64 * recording.sample_time;
             if let Some(gain) = &gain {
                 // The states of a trajectory are those before the correction.
                 let y: Vec<f64> = trajectory.outputs.iter().map(|y| y[k]).collect();
@@ -201,9 +205,16 @@ pub(in crate::explain::engine) fn path(
                     }
                 }
             }
-            let linear = lineariser.at(&state, &inputs, time);
-            for (column, &v) in of_arguments.iter_mut().zip(&linear.output[l..]) {
-                column.push(v);
+            let linear = lineariser.at(&state, &inputs, time(k));
+            let after = (k + 1).min(samples - 1);
+            for (to, u) in inputs.iter_mut().zip(&recording.inputs) {
+                *to = u[(k + held).min(after)];
+            }
+            let end = lineariser.at(&at(after), &inputs, time(after));
+            let both = linear.output[l..].iter().zip(&end.output[l..]);
+            for ([values, ends], (&value, &end)) in of_arguments.iter_mut().zip(both) {
+                values.push(value);
+                ends.push(end);
             }
             all.push(linear);
         }
@@ -213,31 +224,29 @@ pub(in crate::explain::engine) fn path(
             .collect();
         let steps = Steps::new(&all, (&discrete, l), tested.as_ref(), recording);
         path.0.push(steps);
-        for (to, column) in values.iter_mut().zip(of_arguments) {
-            to.push(column);
+        for (to, columns) in values.iter_mut().zip(of_arguments) {
+            to.iter_mut().zip(columns).for_each(|(to, c)| to.push(c));
         }
     }
-    for (argument, values) in arguments.iter_mut().zip(values) {
-        argument.set(values);
+    for (argument, [values, ends]) in arguments.iter_mut().zip(values) {
+        argument.set(values, ends);
     }
     Some(path)
 }
 
 impl Path {
-    /// Changes of the outputs by signals that enter at a hook, at most [`TOGETHER`] of them, each with whether it is held between
-    /// samples.
-    pub(crate) fn propagate(&self, column: usize, signals: &[(&Series, bool)]) -> Vec<Series> {
+    /// Changes of the outputs by signals that enter at a hook, at most [`TOGETHER`] of them, each with its values at the end of
+    /// each sample; between, it is a straight line.
+    pub(crate) fn propagate(&self, column: usize, signals: &[(&Series, &Series)]) -> Vec<Series> {
         let mut all = vec![Series::new(); signals.len()];
         for (r, steps) in self.0.iter().enumerate() {
             let samples = signals.first().map_or(0, |(signal, _)| signal[r].len());
             let mut values = vec![[0.0; TOGETHER]; samples];
             let mut between = values.clone();
-            for (w, (signal, held)) in signals.iter().enumerate() {
-                let signal = &signal[r];
-                for (k, b) in signal.iter().enumerate() {
-                    let next = signal.get(k + 1).filter(|_| !held).unwrap_or(b);
+            for (w, (signal, ends)) in signals.iter().enumerate() {
+                for (k, (b, end)) in signal[r].iter().zip(&ends[r]).enumerate() {
                     values[k][w] = *b;
-                    between[k][w] = 0.5 * (b + next);
+                    between[k][w] = 0.5 * (b + end);
                 }
             }
             for y in steps.propagate(column, &values, &between) {

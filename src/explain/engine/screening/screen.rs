@@ -15,7 +15,7 @@ use crate::explain::engine::terms::argument::{Argument, ArgumentForm, arguments}
 use crate::explain::engine::terms::library::TERMS;
 use crate::explain::engine::terms::names::{heats_itself, is_without_units, rank_of};
 use crate::explain::engine::terms::term::{Needs, Port, Starts, Term};
-use crate::explain::engine::terms::values::{Instance, evaluate, grid};
+use crate::explain::engine::terms::values::{Instance, evaluate_with_ends, grid};
 use crate::explain::engine::thresholds::significant;
 use crate::explain::explanation::EquationMap;
 use crate::noise::Series;
@@ -247,24 +247,25 @@ struct Tests<'a> {
 impl Tests<'_> {
     /// Tests terms at every place that takes them.
     fn of(&self, chunk: &[Instance]) -> Vec<Lead> {
-        let values = evaluate(chunk, self.arguments, self.recordings);
-        let signals: Vec<(&Instance, Series)> = (chunk.iter())
+        let hold = self.study.hold();
+        let values = evaluate_with_ends(chunk, self.arguments, self.recordings, hold);
+        let signals: Vec<(&Instance, [Series; 2])> = (chunk.iter())
             .zip(values.into_iter().flatten())
-            .filter(|(_, signal)| signal.iter().flatten().all(|v| v.is_finite()))
+            .filter(|(_, both)| both.iter().flatten().flatten().all(|v| v.is_finite()))
             .collect();
         let mut leads = Vec::new();
-        for (instance, signal) in &signals {
+        for (instance, [signal, _]) in &signals {
             if instance.term.port == Port::Sensor {
                 leads.extend(self.at_sensors(instance, signal));
             }
         }
         for (&place, &column) in self.hooked.places.iter().zip(&self.hooked.columns) {
-            let here: Vec<&(&Instance, Series)> = (signals.iter())
+            let here: Vec<&(&Instance, [Series; 2])> = (signals.iter())
                 .filter(|(instance, _)| self.fits(instance, place))
                 .collect();
             for together in here.chunks(TOGETHER) {
-                let entering: Vec<(&Series, bool)> = (together.iter())
-                    .map(|(instance, signal)| (signal, self.is_held(instance)))
+                let entering: Vec<(&Series, &Series)> = (together.iter())
+                    .map(|(_, [signal, ends])| (signal, ends))
                     .collect();
                 let propagated = self.path.propagate(column, &entering);
                 let each = together.iter().zip(&propagated);
@@ -277,12 +278,6 @@ impl Tests<'_> {
 
     fn argument(&self, instance: &Instance) -> Option<&Argument> {
         instance.argument.map(|a| &self.arguments[a])
-    }
-
-    /// Whether a term stays between samples as it is.
-    fn is_held(&self, instance: &Instance) -> bool {
-        let argument = self.argument(instance);
-        argument.is_some_and(|a| a.held) && instance.term.memories.iter().all(|m| m.sampled)
     }
 
     /// Tests what a term does to the outputs.

@@ -39,6 +39,9 @@ pub(crate) struct Argument {
     pub(crate) held: bool,
     /// Values along each recording.
     pub(crate) values: Vec<Vec<f64>>,
+    /// Values at the end of each sample, before anything of the next one is known: inputs that are held have not changed yet, and
+    /// an observer has not corrected. Under feedback they would tell of the noise that is to come.
+    pub(crate) ends: Vec<Vec<f64>>,
     sorted: Vec<f64>,
 }
 
@@ -79,12 +82,14 @@ impl Argument {
             variables,
             known_after,
             values: Vec::new(),
+            ends: Vec::new(),
             sorted: Vec::new(),
         }
     }
 
     /// Takes over the values.
-    pub(crate) fn set(&mut self, values: Vec<Vec<f64>>) {
+    pub(crate) fn set(&mut self, values: Vec<Vec<f64>>, ends: Vec<Vec<f64>>) {
+        self.ends = ends;
         let all: Vec<f64> = values.iter().flatten().copied().collect();
         let every = (all.len() / SORTED).max(1);
         self.sorted = all.into_iter().step_by(every).collect();

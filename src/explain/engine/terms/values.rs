@@ -3,6 +3,7 @@
 use crate::explain::engine::fitting::edit::literal;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::term::{MEMORIES, Memory, MemoryStart, Starts, Term};
+use crate::noise::Series;
 use crate::physics::estimate::PlantRecording;
 use crate::physics::{Excitation, Hold, Plant, parse};
 
@@ -124,16 +125,28 @@ pub(in crate::explain::engine) fn evaluate(
     instances: &[Instance],
     arguments: &[Argument],
     recordings: &[PlantRecording],
-) -> Option<Vec<Vec<Vec<f64>>>> {
+) -> Option<Vec<Series>> {
+    let both = evaluate_with_ends(instances, arguments, recordings, Hold::Linear)?;
+    Some(both.into_iter().map(|[values, _]| values).collect())
+}
+
+/// The same with the values at the end of each sample; see [`Argument::ends`].
+pub(in crate::explain::engine) fn evaluate_with_ends(
+    instances: &[Instance],
+    arguments: &[Argument],
+    recordings: &[PlantRecording],
+    hold: Hold,
+) -> Option<Vec<[Series; 2]>> {
     let h = recordings.first()?.sample_time;
     let mut used: Vec<usize> = instances.iter().filter_map(|i| i.argument).collect();
     used.sort_unstable();
     used.dedup();
-    let mut columns: Vec<Vec<Vec<f64>>> = vec![vec![]; instances.len()];
+    let of_inputs = used.iter().all(|&a| arguments[a].held);
+    let mut columns: Vec<[Series; 2]> = vec![Default::default(); instances.len()];
     for (r, recording) in recordings.iter().enumerate() {
         let mut text = String::from("model Terms\n");
         for a in &used {
-            text.push_str(&format!("input Real z{a};\n"));
+            text.push_str(&format!("input Real z{a};\ninput Real end{a};\n"));
         }
         let mut equations = String::from("equation\n");
         for (i, instance) in instances.iter().enumerate() {
@@ -147,13 +160,18 @@ pub(in crate::explain::engine) fn evaluate(
                 .map(|j| format!("m{i}_{j}"))
                 .collect();
             // What stands at the place is what parameters scale, and a size of the term does not matter here.
-            let fill = |form: &str| {
-                filled(form, instance.term, &argument, &memories, &shapes, h)
+            let fill = |argument: &str| {
+                let form = instance.term.form;
+                filled(form, instance.term, argument, &memories, &shapes, h)
                     .replace("{v}", "0.0")
                     .replace("{a}", "1.0")
             };
-            text.push_str(&format!("output Real b{i};\n"));
-            equations.push_str(&format!("b{i} = {};\n", fill(instance.term.form)));
+            text.push_str(&format!("output Real b{i};\noutput Real c{i};\n"));
+            equations.push_str(&format!("b{i} = {};\n", fill(&argument)));
+            let end = instance
+                .argument
+                .map_or(String::new(), |a| format!("end{a}"));
+            equations.push_str(&format!("c{i} = {};\n", fill(&end)));
             for (memory, name) in instance.term.memories.iter().zip(&memories) {
                 let first = instance.argument.map_or(0.0, |a| arguments[a].values[r][0]);
                 let start = memory.start.at(first);
@@ -165,23 +183,49 @@ pub(in crate::explain::engine) fn evaluate(
         }
         let plant = Plant::new(parse(&format!("{text}{equations}end Terms;\n")).ok()?)
             .with_accuracy(TERM_ACCURACY);
-        let inputs: Vec<&[f64]> = used
-            .iter()
-            .map(|&a| arguments[a].values[r].as_slice())
+        // At each sample the end of the one before.
+        let ends: Vec<Vec<f64>> = (used.iter())
+            .map(|&a| {
+                let (values, ends) = (&arguments[a].values[r], &arguments[a].ends[r]);
+                let before = values.first().into_iter().chain(ends).take(values.len());
+                before.copied().collect()
+            })
+            .collect();
+        let inputs: Vec<&[f64]> = (used.iter().zip(&ends))
+            .flat_map(|(&a, ends)| [arguments[a].values[r].as_slice(), ends])
             .collect();
         let excitation = Excitation {
             inputs: &inputs,
             length: recording.outputs[0].len(),
             sample_time: h,
             start_time: recording.start_time,
-            hold: Hold::Linear,
+            hold: if of_inputs { hold } else { Hold::Linear },
         };
         let run = plant.simulate(&plant.nominal(), &excitation, None).ok()?;
-        for (to, column) in columns.iter_mut().zip(run.outputs) {
-            to.push(column);
+        let mut outputs = run.outputs.into_iter();
+        for (instance, [values, ends]) in instances.iter().zip(&mut columns) {
+            let (at, end) = (outputs.next()?, outputs.next()?);
+            ends.push(instance.ends(&at, end, arguments));
+            values.push(at);
         }
     }
     Some(columns)
+}
+
+impl Instance {
+    /// Values at the end of each sample, from those at the samples and, `before` each sample, those of the argument's end.
+    fn ends(&self, at: &[f64], before: Vec<f64>, arguments: &[Argument]) -> Vec<f64> {
+        let memories = self.term.memories;
+        let at_samples = !memories.is_empty() && memories.iter().all(|m| m.sampled);
+        let after = match self.argument {
+            // What changes at samples only stays as it is until the next.
+            Some(a) if at_samples && arguments[a].held => return at.to_vec(),
+            Some(_) if !at_samples => &before,
+            _ => at,
+        };
+        let next = after.iter().skip(1).chain(at.last());
+        next.copied().collect()
+    }
 }
 
 impl Memory {
