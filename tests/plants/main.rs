@@ -14,6 +14,7 @@ mod physics_texts;
 mod plant_cli;
 mod plant_coast_down;
 mod plant_explain;
+mod plant_feedback;
 mod plant_few_samples;
 mod plant_gravity;
 mod plant_held_out;

@@ -100,25 +100,11 @@ pub(super) fn left(problem: &Problem, residual: &Series) -> Vec<f64> {
     (0..l).map(of_output).collect()
 }
 
-/// The fit in free run from the values of the text, under white noise and under noise of the colour that these values leave, and,
-/// unless that leaves white noise that does not depend on the inputs, to
+/// The fit in free run from the values of the text and, unless that leaves white noise that does not depend on the inputs, to
 /// longer and longer parts of the recordings; unless both end at one summit, also from the values of the text less one term
 /// each, and from draws within the bounds. Summits are compared under white noise: a
 /// coloured noise model would absorb what a wrong one leaves.
 pub(super) fn fit_free_run(problem: &Problem) -> Option<Fit> {
-    let best = searched_under_white_noise(problem);
-    if best.as_ref().is_some_and(|fit| leaves_noise(problem, fit)) {
-        return best;
-    }
-    // Under feedback the inputs follow slow noise, and a fit under white noise leads to the inverse of the controller
-    // (L. Ljung, *System Identification*, 2nd ed., section 13.4).
-    let reached = |fit: &Fit| fit.criterion;
-    let rival = best.as_ref().map_or(f64::INFINITY, reached);
-    let from_text = coloured_fit(problem, problem.nominal(), rival);
-    from_text.filter(|fit| fit.criterion < rival).or(best)
-}
-
-fn searched_under_white_noise(problem: &Problem) -> Option<Fit> {
     let mut point = problem.nominal();
     let mut highest = white_fit(problem, &mut point, SEARCH).unwrap_or(f64::INFINITY);
     let mut best = if highest.is_finite() {
