@@ -27,11 +27,12 @@ pub(crate) fn is_doubtful(explanation: &Explanation) -> bool {
         }
 }
 
-/// Whether an explanation relative to a linear simulator needs no second opinion: it found nothing, or a listed effect.
-pub(crate) fn is_sure(explanation: &Explanation) -> bool {
+/// Whether an explanation relative to a linear simulator needs no second opinion: it found nothing, or a listed effect, or a law of
+/// outputs without units, whose name depends on these.
+pub(crate) fn is_sure(explanation: &Explanation, has_units: bool) -> bool {
     match explanation.verdict {
         Verdict::Consistent | Verdict::Parameters => true,
-        Verdict::Named | Verdict::Family => !is_law(explanation),
+        Verdict::Named | Verdict::Family => !(has_units && is_law(explanation)),
         Verdict::Unexplained => false,
     }
 }
@@ -170,8 +171,9 @@ mod tests {
         let drag = with(0.9, Verdict::Named, "quadratic_drag");
         let law = with(1.0, Verdict::Named, "law");
         let unexplained = with(1.0, Verdict::Unexplained, "hysteresis");
-        assert!(!is_sure(&law) && !is_sure(&unexplained) && is_sure(&drag));
-        assert!(is_sure(&with(1.0, Verdict::Parameters, "law")));
+        assert!(!is_sure(&law, true) && is_sure(&law, false) && is_sure(&drag, true));
+        assert!(!is_sure(&unexplained, false));
+        assert!(is_sure(&with(1.0, Verdict::Parameters, "law"), true));
         assert!(replaces(&drag, &law) && !replaces(&law, &law));
         assert!(!replaces(
             &with(1.1, Verdict::Named, "quadratic_drag"),

@@ -124,7 +124,9 @@ fn explain_linear(
 
 /// An answer that is not sure is compared with that of the equations that reproduce the simulated outputs.
 fn second_opinion(explanation: Explanation, checked: &Checked, options: &Options) -> Explanation {
-    if !checked.troubles.is_empty() || is_sure(&explanation) {
+    let mut outputs = checked.recordings.iter().flat_map(|r| &r.outputs);
+    let has_units = outputs.all(|o| o.unit.is_some());
+    if !checked.troubles.is_empty() || is_sure(&explanation, has_units) {
         return explanation;
     }
     let by_equations = || {

@@ -9,6 +9,7 @@ use super::holdout::{EXPLAINED, Estimator, HeldOut, held_out};
 use super::hypothesis::Trial;
 use super::long_recordings::Searched;
 use super::scope::Scope;
+use super::screening::along::range_along;
 use super::step::{Stage, Step, improved, step};
 use super::terms::names::named;
 use super::terms::term::Needs;
@@ -71,14 +72,19 @@ impl Found {
         }
     }
 
-    /// Gives the effects the shapes of the final fit: names depend on them.
-    pub(crate) fn take_shapes(&mut self) {
+    /// Gives the effects the shapes of the final fit, and the ranges of their variables along it: names depend on them.
+    pub(crate) fn take_shapes(&mut self, recordings: &[PlantRecording]) {
+        let study = Study::new(&self.plant, recordings, &self.options).ok();
         let mut first = self.given.spec.parameters().len();
         let accepted = self.steps.iter_mut().take(self.accepted);
         for effect in accepted.filter_map(|step| step.first_mut()) {
             let count = effect.shapes.len();
             if let Some(shapes) = self.fit.point.get(first..first + count) {
                 effect.shapes.copy_from_slice(shapes);
+            }
+            if let Some(study) = &study {
+                let range = range_along((study, &self.fit), recordings, &effect.argument);
+                effect.range = range.unwrap_or(effect.range);
             }
             first += effect.candidate.values.len();
         }

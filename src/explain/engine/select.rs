@@ -184,7 +184,7 @@ fn settle(
     if let Some(with) = last {
         found.options.least_squares = with.estimator != Estimator::Likelihood;
         found.fit = with.fit.clone();
-        found.take_shapes();
+        found.take_shapes(recordings);
         found.information = information(found, recordings).unwrap_or(1.0);
         if judged && let Some(without) = baseline {
             found.held_out = Some([without.held_out.clone(), with.held_out.clone()]);

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::explain::engine::fitting::fitted::{Fitted, searched, with_more};
-use crate::explain::engine::screening::along::along;
+use crate::explain::engine::screening::along::range_along;
 use crate::explain::engine::terms::names::{SPECIFIC, rank};
 use crate::explain::engine::thresholds::{FINISHED, MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
@@ -39,17 +39,8 @@ pub(in crate::explain::engine) fn finished(
             let inner = study.of(&limited, &options).ok()?;
             let refined = inner.refit(&f.fit, ROUNDS, THOROUGH)?;
             // Of a plant that the term has changed much, its variable has other values than before.
-            let range = (!f.argument.is_empty()).then(|| {
-                let values = along(
-                    (&inner, &refined),
-                    recordings,
-                    std::slice::from_ref(&f.argument),
-                )?
-                .pop()?;
-                let from = values.iter().copied().min_by(f64::total_cmp)?;
-                Some((from, values.iter().copied().max_by(f64::total_cmp)?))
-            });
-            Some((refined, range.flatten()))
+            let range = range_along((&inner, &refined), recordings, &f.argument);
+            Some((refined, range))
         })
         .collect();
     for (f, refined) in fitted.iter_mut().zip(refined) {

@@ -7,6 +7,19 @@ use crate::physics::estimate::{Fit, PlantRecording, Study};
 /// Samples of a recording that are looked at.
 const LOOKED_AT: usize = 1000;
 
+/// Smallest and largest value of an expression along the predictions of a plant; none for what has no argument.
+pub(in crate::explain::engine) fn range_along(
+    fitted: (&Study, &Fit),
+    recordings: &[PlantRecording],
+    text: &str,
+) -> Option<(f64, f64)> {
+    let texts = [text.to_owned()];
+    let wanted = if text.is_empty() { &[] } else { &texts[..] };
+    let values = along(fitted, recordings, wanted)?.pop()?;
+    let from = values.iter().copied().min_by(f64::total_cmp)?;
+    Some((from, values.iter().copied().max_by(f64::total_cmp)?))
+}
+
 /// Values of expressions in the variables of a plant along its predictions, for all recordings one after the other.
 pub(in crate::explain::engine) fn along(
     (study, fit): (&Study, &Fit),
