@@ -4,11 +4,13 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::explain::engine::fitting::candidate::candidate;
+use crate::explain::engine::fitting::edit::Place;
 use crate::explain::engine::fitting::fitted::{Fitted, searched, with_more};
 use crate::explain::engine::hypothesis::Ground;
 use crate::explain::engine::screening::curve::Curve;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
+use crate::explain::engine::terms::library::TERMS;
 use crate::explain::engine::terms::term::{Needs, Port, Starts, Term, curve, shape};
 use crate::explain::engine::terms::values::{Instance, evaluate, grid};
 use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
@@ -137,6 +139,19 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
     }
     found.sort_by(|a, b| a.left.total_cmp(&b.left));
     found.truncate(FITTED);
+    // A straight line is no curve; from far away its own fit may have ended elsewhere.
+    if let Place::Equation(_) = best.lead.place
+        && let Some(term) = TERMS.iter().find(|term| term.id == "linear")
+    {
+        let basis = DMatrix::from_fn(z.len(), 2, |i, j| [1.0, z[i]][j]);
+        let line = (basis.tr_mul(&basis).cholesky()).map(|n| n.solve(&basis.tr_mul(&wanted)));
+        found.extend(line.map(|line| Near {
+            term,
+            shapes: vec![],
+            strength: line[1],
+            left: 0.0,
+        }));
+    }
     Some(found)
 }
 
