@@ -63,7 +63,8 @@ pub use roles::{Missing, RoleNeed, Roles, TimeUnit};
 pub(crate) use sample_time::is_sample_time;
 pub use text::{Channel, Source};
 #[cfg(feature = "cli")]
-pub(crate) use time::{Origin, counted};
+pub(crate) use time::Origin;
+pub(crate) use time::counted;
 #[cfg(feature = "cli")]
 pub(crate) use write::write_file_atomically;
 pub use write::{CsvWriter, write_table};
