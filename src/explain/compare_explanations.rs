@@ -58,16 +58,13 @@ pub(crate) fn doubt(explanation: &mut Explanation) {
     }
     let said = if removed(explanation) > 0.0 {
         explanation.verdict = Verdict::Unexplained;
-        "something is left out, and the following is not sure, because other parameters of the simulator may look like it."
+        "Something is left out, and the following is not sure, because other parameters of the simulator may look like it."
     } else {
         explanation.verdict = Verdict::Parameters;
         explanation.effects.clear();
-        "other parameters explain blocks of the recording that were not fitted as well as the following does."
+        "Other parameters explain blocks of the recording that were not fitted as well as the following does."
     };
-    explanation.summary.insert(
-        0,
-        format!("The simulator is not linear, and no equations were found that reproduce its columns closely: {said}"),
-    );
+    explanation.summary.insert(0, said.to_owned());
 }
 
 /// Error of one explanation's run over that of another, the geometric mean over recordings and outputs; none where they show

@@ -216,7 +216,7 @@ fn explain_nonlinear(
     let found = found.ok_or_else(|| no_fit(checked))?;
     let mut explanation = said(&known, checked, found, options.seed);
     explanation.summary.push(
-        "The simulated columns are not those of a linear plant, and no equations were found that reproduce them closely: this answer is relative to the columns."
+        "The simulator is not linear, and no equations were found that reproduce its columns closely: this answer is relative to the columns."
             .to_owned(),
     );
     // A doubtful answer relative to the columns stands against effects of the sensors, which need no equations, and against

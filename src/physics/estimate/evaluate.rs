@@ -169,11 +169,7 @@ fn initial_states(
     if let Some(gain) = held.gain {
         point.extend(problem.places_of_gains().map(|at| gain[at]));
     }
-    let pinned = |&value: &f64| Range {
-        min: value,
-        max: value,
-        reach: 0.0,
-    };
+    let pinned = |&value: &f64| Range::held(value);
     let mut ranges: Vec<Range> = point[..p].iter().map(pinned).collect();
     ranges.extend(problem.ranges().into_iter().skip(p));
     ranges.extend(point[numbers..].iter().map(pinned));

@@ -57,11 +57,7 @@ pub(super) fn continue_free_run(problem: &Problem, innovation: &Fit) -> Option<F
             *gain = weaker * strong;
         }
         ranges.truncate(numbers);
-        ranges.extend(point[numbers..].iter().map(|&gain| Range {
-            min: gain,
-            max: gain,
-            reach: 0.0,
-        }));
+        ranges.extend(point[numbers..].iter().map(|&gain| Range::held(gain)));
         let mut objective =
             Deviance::new(problem, Form::Innovation, Noise::unit(problem.outputs()));
         objective.noise = objective.rescale(&point)?;
@@ -243,11 +239,7 @@ pub(super) fn white_fit_holding(
     let mut objective = Deviance::new(problem, Form::FreeRun, Noise::unit(problem.outputs()));
     let mut ranges = problem.ranges();
     if let Some(i) = held {
-        ranges[i] = Range {
-            min: point[i],
-            max: point[i],
-            reach: 0.0,
-        };
+        ranges[i] = Range::held(point[i]);
     }
     for _ in 0..2 {
         objective.noise = objective.rescale(point)?;

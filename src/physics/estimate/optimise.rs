@@ -28,6 +28,17 @@ pub(super) struct Range {
     pub(super) reach: f64,
 }
 
+impl Range {
+    /// Of a number that stays where it is.
+    pub(super) fn held(at: f64) -> Self {
+        Self {
+            min: at,
+            max: at,
+            reach: 0.0,
+        }
+    }
+}
+
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {

@@ -88,11 +88,7 @@ pub(super) fn interval(
             }
             point[i] = tried;
             let mut held = ranges.clone();
-            held[i] = Range {
-                min: tried,
-                max: tried,
-                reach: 0.0,
-            };
+            held[i] = Range::held(tried);
             let Some(deviance) = minimise(objective, &mut point, &held, OTHERS) else {
                 // What cannot be simulated is outside.
                 at = 0.5 * (value + tried);

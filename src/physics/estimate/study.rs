@@ -164,11 +164,7 @@ impl<'a> Study<'a> {
         let mut ranges = self.problem.ranges();
         ranges.extend(unbounded(point.len() - ranges.len()));
         for &i in held {
-            ranges[i] = Range {
-                min: point[i],
-                max: point[i],
-                reach: 0.0,
-            };
+            ranges[i] = Range::held(point[i]);
         }
         let mut objective = Deviance::new(&self.problem, from.form, from.noise.clone());
         objective.gain_held = gain_held;

@@ -114,152 +114,153 @@ impl Plant {
         if !self.tape.delays.is_empty() || self.linearity.holds(excitation.hold) {
             return None;
         }
+        // As one function, so that all of it uses the wide instructions of the processor.
         let columns = self.tape.arch.dispatch(
             #[inline(always)]
-            || self.frozen_columns(point, excitation, observer, plan, states, directions),
+            || {
+                let (n, l, d) = (states.len(), self.tape.outputs.len(), directions.len());
+                let of_parameters: Vec<usize> = (0..d)
+                    .filter(|&i| matches!(directions[i], Direction::Parameter(_)))
+                    .collect();
+                let groups: Vec<&[usize]> = match of_parameters.len() {
+                    0 => vec![&[]],
+                    _ => of_parameters.chunks(TOGETHER).collect(),
+                };
+                let chosen: Vec<Vec<Direction>> = groups
+                    .iter()
+                    .map(|group| group.iter().map(|&i| directions[i]).collect())
+                    .collect();
+                // Slopes of the states: a row for each state, a column for each direction.
+                let mut slopes = vec![0.0; n * d];
+                let mut fields: Vec<Field<TOGETHER>> = Vec::new();
+                for (group, chosen) in groups.iter().zip(&chosen) {
+                    let start =
+                        self.integrator::<TOGETHER>(point, excitation, &plan.widths, chosen);
+                    for (i, x) in start.x.iter().enumerate() {
+                        for (lane, &column) in group.iter().enumerate() {
+                            slopes[i * d + column] = x.slope[lane];
+                        }
+                    }
+                    fields.push(start.field);
+                }
+                for (column, direction) in directions.iter().enumerate() {
+                    if let Direction::Start(i) = direction {
+                        slopes[i * d + column] = 1.0;
+                    }
+                }
+                let mut columns = vec![vec![Vec::with_capacity(excitation.length); d]; l];
+                let mut exponential = Exponential::new(n);
+                let (mut derivative, mut jacobian) = (vec![0.0; n], vec![0.0; n * n]);
+                let (mut value, mut of_outputs) = (vec![0.0; l], vec![0.0; l * n]);
+                let mut x: Vec<f64> = vec![0.0; n];
+                let mut dual = vec![Dual::constant(0.0); n];
+                let mut rates = dual.clone();
+                let mut push = vec![0.0; n * d];
+                let mut next = vec![0.0; n * d];
+                let mut of_y = vec![0.0; l * d];
+                let mut evaluate = |field: &mut Field<TOGETHER>, time: f64, x: &[f64]| {
+                    for (to, &x) in dual.iter_mut().zip(x) {
+                        *to = Dual::constant(x);
+                    }
+                    field.evaluate(&Dual::constant(time), &dual, &mut rates);
+                };
+                for k in 0..excitation.length {
+                    let now = excitation.time(k);
+                    for (x, column) in x.iter_mut().zip(states) {
+                        *x = column[k];
+                    }
+                    for field in &mut fields {
+                        field.begin(k);
+                    }
+                    fields[0].linearise_outputs(
+                        &Dual::constant(now),
+                        &x,
+                        &mut value,
+                        &mut of_outputs,
+                    );
+                    of_y.fill(0.0);
+                    for (field, group) in fields.iter_mut().zip(&groups) {
+                        evaluate(field, now, &x);
+                        for (o, &slot) in self.tape.outputs.iter().enumerate() {
+                            for (lane, &column) in group.iter().enumerate() {
+                                of_y[o * d + column] = field.frame.slot[slot].slope[lane];
+                            }
+                        }
+                    }
+                    for o in 0..l {
+                        for i in 0..n {
+                            let c = of_outputs[o * n + i];
+                            if c != 0.0 {
+                                for column in 0..d {
+                                    of_y[o * d + column] += c * slopes[i * d + column];
+                                }
+                            }
+                        }
+                        for (to, &slope) in columns[o].iter_mut().zip(&of_y[o * d..(o + 1) * d]) {
+                            to.push(slope);
+                        }
+                    }
+                    if k + 1 == excitation.length {
+                        break;
+                    }
+                    if let Some(observer) = observer {
+                        for o in 0..l {
+                            let error = observer.recorded[o][k] - value[o];
+                            if !error.is_finite() {
+                                continue;
+                            }
+                            for (i, x) in x.iter_mut().enumerate() {
+                                let gain = observer.gain[(i, o)];
+                                *x += gain * error;
+                                for column in 0..d {
+                                    slopes[i * d + column] -= gain * of_y[o * d + column];
+                                }
+                                let own = Direction::Gain(i, o);
+                                if let Some(column) = directions.iter().position(|&d| d == own) {
+                                    slopes[i * d + column] += error;
+                                }
+                            }
+                        }
+                    }
+                    for (x, column) in x.iter_mut().zip(states) {
+                        *x = 0.5 * (*x + column[k + 1]);
+                    }
+                    let middle = now + 0.5 * excitation.sample_time;
+                    fields[0].linearise(
+                        &Dual::constant(middle),
+                        &x,
+                        &mut derivative,
+                        &mut jacobian,
+                    );
+                    exponential.of(&jacobian, excitation.sample_time);
+                    push.fill(0.0);
+                    for (field, group) in fields.iter_mut().zip(&groups) {
+                        evaluate(field, middle, &x);
+                        for (i, &slot) in self.tape.derivatives.iter().enumerate() {
+                            for (lane, &column) in group.iter().enumerate() {
+                                push[i * d + column] =
+                                    excitation.sample_time * field.frame.slot[slot].slope[lane];
+                            }
+                        }
+                    }
+                    next.fill(0.0);
+                    for i in 0..n {
+                        let to = &mut next[i * d..(i + 1) * d];
+                        for j in 0..n {
+                            let (e, phi) = (exponential.exp[i * n + j], exponential.phi[i * n + j]);
+                            let (s, p) = (&slopes[j * d..(j + 1) * d], &push[j * d..(j + 1) * d]);
+                            for ((to, s), p) in to.iter_mut().zip(s).zip(p) {
+                                *to += e * s + phi * p;
+                            }
+                        }
+                    }
+                    std::mem::swap(&mut slopes, &mut next);
+                }
+                columns
+            },
         );
         let finite = columns.iter().flatten().flatten().all(|v| v.is_finite());
         finite.then_some(columns)
-    }
-
-    #[inline(always)]
-    fn frozen_columns(
-        &self,
-        point: &Point,
-        excitation: &Excitation,
-        observer: Option<&Observer>,
-        plan: &Plan,
-        states: &[Vec<f64>],
-        directions: &[Direction],
-    ) -> Vec<Vec<Vec<f64>>> {
-        let (n, l, d) = (states.len(), self.tape.outputs.len(), directions.len());
-        let of_parameters: Vec<usize> = (0..d)
-            .filter(|&i| matches!(directions[i], Direction::Parameter(_)))
-            .collect();
-        let groups: Vec<&[usize]> = match of_parameters.len() {
-            0 => vec![&[]],
-            _ => of_parameters.chunks(TOGETHER).collect(),
-        };
-        let chosen: Vec<Vec<Direction>> = groups
-            .iter()
-            .map(|group| group.iter().map(|&i| directions[i]).collect())
-            .collect();
-        // Slopes of the states: a row for each state, a column for each direction.
-        let mut slopes = vec![0.0; n * d];
-        let mut fields: Vec<Field<TOGETHER>> = Vec::new();
-        for (group, chosen) in groups.iter().zip(&chosen) {
-            let start = self.integrator::<TOGETHER>(point, excitation, &plan.widths, chosen);
-            for (i, x) in start.x.iter().enumerate() {
-                for (lane, &column) in group.iter().enumerate() {
-                    slopes[i * d + column] = x.slope[lane];
-                }
-            }
-            fields.push(start.field);
-        }
-        for (column, direction) in directions.iter().enumerate() {
-            if let Direction::Start(i) = direction {
-                slopes[i * d + column] = 1.0;
-            }
-        }
-        let mut columns = vec![vec![Vec::with_capacity(excitation.length); d]; l];
-        let mut exponential = Exponential::new(n);
-        let (mut derivative, mut jacobian) = (vec![0.0; n], vec![0.0; n * n]);
-        let (mut value, mut of_outputs) = (vec![0.0; l], vec![0.0; l * n]);
-        let mut x: Vec<f64> = vec![0.0; n];
-        let mut dual = vec![Dual::constant(0.0); n];
-        let mut rates = dual.clone();
-        let mut push = vec![0.0; n * d];
-        let mut next = vec![0.0; n * d];
-        let mut of_y = vec![0.0; l * d];
-        let mut evaluate = |field: &mut Field<TOGETHER>, time: f64, x: &[f64]| {
-            for (to, &x) in dual.iter_mut().zip(x) {
-                *to = Dual::constant(x);
-            }
-            field.evaluate(&Dual::constant(time), &dual, &mut rates);
-        };
-        for k in 0..excitation.length {
-            let now = excitation.time(k);
-            for (x, column) in x.iter_mut().zip(states) {
-                *x = column[k];
-            }
-            for field in &mut fields {
-                field.begin(k);
-            }
-            fields[0].linearise_outputs(&Dual::constant(now), &x, &mut value, &mut of_outputs);
-            of_y.fill(0.0);
-            for (field, group) in fields.iter_mut().zip(&groups) {
-                evaluate(field, now, &x);
-                for (o, &slot) in self.tape.outputs.iter().enumerate() {
-                    for (lane, &column) in group.iter().enumerate() {
-                        of_y[o * d + column] = field.frame.slot[slot].slope[lane];
-                    }
-                }
-            }
-            for o in 0..l {
-                for i in 0..n {
-                    let c = of_outputs[o * n + i];
-                    if c != 0.0 {
-                        for column in 0..d {
-                            of_y[o * d + column] += c * slopes[i * d + column];
-                        }
-                    }
-                }
-                for (to, &slope) in columns[o].iter_mut().zip(&of_y[o * d..(o + 1) * d]) {
-                    to.push(slope);
-                }
-            }
-            if k + 1 == excitation.length {
-                break;
-            }
-            if let Some(observer) = observer {
-                for o in 0..l {
-                    let error = observer.recorded[o][k] - value[o];
-                    if !error.is_finite() {
-                        continue;
-                    }
-                    for (i, x) in x.iter_mut().enumerate() {
-                        let gain = observer.gain[(i, o)];
-                        *x += gain * error;
-                        for column in 0..d {
-                            slopes[i * d + column] -= gain * of_y[o * d + column];
-                        }
-                        let own = Direction::Gain(i, o);
-                        if let Some(column) = directions.iter().position(|&d| d == own) {
-                            slopes[i * d + column] += error;
-                        }
-                    }
-                }
-            }
-            for (x, column) in x.iter_mut().zip(states) {
-                *x = 0.5 * (*x + column[k + 1]);
-            }
-            let middle = now + 0.5 * excitation.sample_time;
-            fields[0].linearise(&Dual::constant(middle), &x, &mut derivative, &mut jacobian);
-            exponential.of(&jacobian, excitation.sample_time);
-            push.fill(0.0);
-            for (field, group) in fields.iter_mut().zip(&groups) {
-                evaluate(field, middle, &x);
-                for (i, &slot) in self.tape.derivatives.iter().enumerate() {
-                    for (lane, &column) in group.iter().enumerate() {
-                        push[i * d + column] =
-                            excitation.sample_time * field.frame.slot[slot].slope[lane];
-                    }
-                }
-            }
-            next.fill(0.0);
-            for i in 0..n {
-                let to = &mut next[i * d..(i + 1) * d];
-                for j in 0..n {
-                    let (e, phi) = (exponential.exp[i * n + j], exponential.phi[i * n + j]);
-                    let (s, p) = (&slopes[j * d..(j + 1) * d], &push[j * d..(j + 1) * d]);
-                    for ((to, s), p) in to.iter_mut().zip(s).zip(p) {
-                        *to += e * s + phi * p;
-                    }
-                }
-            }
-            std::mem::swap(&mut slopes, &mut next);
-        }
-        columns
     }
 }
 

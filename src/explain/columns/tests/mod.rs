@@ -102,6 +102,36 @@ fn a_pendulum_is_found_with_its_sine_and_no_more() {
     assert!(text.contains("  y = y_state;"), "{text}");
 }
 
+/// A load on a rope, a tank with a valve, a cone, and a vehicle of given power.
+#[test]
+fn products_of_an_input_with_a_function_of_an_output_are_found() {
+    let first_order = |rate: &str| {
+        format!(
+            "model Store input Real u; output Real y; Real x(start=2); equation der(x) = {rate}; y = x; end Store;"
+        )
+    };
+    let crane = "model Crane input Real u; output Real y; Real x(start=0.3); Real w;
+        equation der(x) = w; der(w) = -0.1*w - 8.5*sin(x) - 0.9*u*cos(x); y = x; end Crane;";
+    for (text, term) in [
+        (crane.to_owned(), "u*cos(y_state)"),
+        (
+            first_order("0.5 - 0.3*u*sqrt(max(x, 0))"),
+            "u*sqrt(max(y_state, 0))",
+        ),
+        (
+            first_order("(0.4*u - 0.3*sqrt(x))/x^2"),
+            "u/max(y_state, 1e-9)^2",
+        ),
+        (first_order("u/max(x, 0.1) - 0.2*x"), "u/max(y_state, 1e-9)"),
+    ] {
+        let u: Vec<f64> = steps(20).iter().map(|u| 1.2 + 0.8 * u).collect();
+        let found = found(&text, &["y"], &u, 0.05);
+        let reproduced = &found.plant.spec.text;
+        assert!(found.misfit < REPRODUCED, "{}: {reproduced}", found.misfit);
+        assert!(reproduced.contains(term), "{term}: {reproduced}");
+    }
+}
+
 #[test]
 fn of_equivalent_orders_those_with_the_fewest_terms_are_taken() {
     let found = found(COIL, &["ic", "xl"], &steps(20), 0.05);

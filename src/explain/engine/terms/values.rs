@@ -126,16 +126,26 @@ pub(in crate::explain::engine) fn evaluate(
     arguments: &[Argument],
     recordings: &[PlantRecording],
 ) -> Option<Vec<Series>> {
-    let both = evaluate_with_ends(instances, arguments, recordings, Hold::Linear)?;
+    let both = values_and_ends(instances, arguments, recordings, None)?;
     Some(both.into_iter().map(|[values, _]| values).collect())
 }
 
-/// The same with the values at the end of each sample; see [`Argument::ends`].
+/// The same with the values at the end of each sample, where inputs are held so; see [`Argument::ends`].
 pub(in crate::explain::engine) fn evaluate_with_ends(
     instances: &[Instance],
     arguments: &[Argument],
     recordings: &[PlantRecording],
     hold: Hold,
+) -> Option<Vec<[Series; 2]>> {
+    values_and_ends(instances, arguments, recordings, Some(hold))
+}
+
+/// The ends are those of the values where no hold is given.
+fn values_and_ends(
+    instances: &[Instance],
+    arguments: &[Argument],
+    recordings: &[PlantRecording],
+    hold: Option<Hold>,
 ) -> Option<Vec<[Series; 2]>> {
     let h = recordings.first()?.sample_time;
     let mut used: Vec<usize> = instances.iter().filter_map(|i| i.argument).collect();
@@ -166,12 +176,12 @@ pub(in crate::explain::engine) fn evaluate_with_ends(
                     .replace("{v}", "0.0")
                     .replace("{a}", "1.0")
             };
-            text.push_str(&format!("output Real b{i};\noutput Real c{i};\n"));
+            text.push_str(&format!("output Real b{i};\n"));
             equations.push_str(&format!("b{i} = {};\n", fill(&argument)));
-            let end = instance
-                .argument
-                .map_or(String::new(), |a| format!("end{a}"));
-            equations.push_str(&format!("c{i} = {};\n", fill(&end)));
+            if let Between::To(a) = instance.between(arguments, hold) {
+                text.push_str(&format!("output Real c{i};\n"));
+                equations.push_str(&format!("c{i} = {};\n", fill(&format!("end{a}"))));
+            }
             for (memory, name) in instance.term.memories.iter().zip(&memories) {
                 let first = instance.argument.map_or(0.0, |a| arguments[a].values[r][0]);
                 let start = memory.start.at(first);
@@ -199,32 +209,47 @@ pub(in crate::explain::engine) fn evaluate_with_ends(
             length: recording.outputs[0].len(),
             sample_time: h,
             start_time: recording.start_time,
-            hold: if of_inputs { hold } else { Hold::Linear },
+            hold: hold.filter(|_| of_inputs).unwrap_or(Hold::Linear),
         };
         let run = plant.simulate(&plant.nominal(), &excitation, None).ok()?;
         let mut outputs = run.outputs.into_iter();
         for (instance, [values, ends]) in instances.iter().zip(&mut columns) {
-            let (at, end) = (outputs.next()?, outputs.next()?);
-            ends.push(instance.ends(&at, end, arguments));
+            let at = outputs.next()?;
+            let next = |of: &[f64]| of.iter().skip(1).chain(at.last()).copied().collect();
+            ends.push(match instance.between(arguments, hold) {
+                Between::Held => at.clone(),
+                Between::Line => next(&at),
+                Between::To(_) => next(&outputs.next()?),
+            });
             values.push(at);
         }
     }
     Some(columns)
 }
 
+/// What a term does from a sample to the next.
+enum Between {
+    Held,
+    /// To its value at the next sample.
+    Line,
+    /// To its value with the end of an argument.
+    To(usize),
+}
+
 impl Instance {
-    /// Values at the end of each sample, from those at the samples and, `before` each sample, those of the argument's end.
-    fn ends(&self, at: &[f64], before: Vec<f64>, arguments: &[Argument]) -> Vec<f64> {
+    fn between(&self, arguments: &[Argument], hold: Option<Hold>) -> Between {
         let memories = self.term.memories;
-        let at_samples = !memories.is_empty() && memories.iter().all(|m| m.sampled);
-        let after = match self.argument {
-            // What changes at samples only stays as it is until the next.
-            Some(a) if at_samples && arguments[a].held => return at.to_vec(),
-            Some(_) if !at_samples => &before,
-            _ => at,
-        };
-        let next = after.iter().skip(1).chain(at.last());
-        next.copied().collect()
+        // What changes at samples only stays as it is until the next.
+        let at_samples = memories.iter().all(|m| m.sampled);
+        match (self.argument, hold) {
+            (None, _) | (_, None) => Between::Line,
+            (Some(a), Some(hold)) if arguments[a].held && at_samples => match (hold, memories) {
+                (Hold::Linear, []) => Between::Line,
+                _ => Between::Held,
+            },
+            (Some(_), _) if !memories.is_empty() && at_samples => Between::Line,
+            (Some(a), _) => Between::To(a),
+        }
     }
 }
 

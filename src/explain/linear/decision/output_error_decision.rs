@@ -277,9 +277,6 @@ pub(crate) fn inquire(
             fit = direct;
             ranked_all.push(Ranked::new(&problem, fit.clone()));
         }
-        if let Some(one) = in_one_recording(&problem, &fit) {
-            fit = one;
-        }
         let judged =
             |fit: &Fit| fit.criterion(count) - if same_plant(fit) { known_plant } else { 0.0 };
         let mut gain = base - judged(&fit);
