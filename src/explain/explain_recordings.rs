@@ -28,8 +28,8 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// A free-run fit of a drive must run through the half of the recording that it was not fitted to with an error this many
-/// times that of the averaged equation to stand in its place: it follows its own half better always, and knows no mass.
+/// A free-run fit of a drive whose errors add up must run through the half of the recording that it was not fitted to with an error
+/// this many times that of the averaged equation to stand in its place: it follows its own half better always, and knows no mass.
 const MUCH_BETTER: f64 = 0.5;
 
 /// What the averaged equation of a drive leaves is mostly noise below this share of structure.
@@ -257,14 +257,6 @@ fn said(
     .say()
 }
 
-/// Whether the finding is an averaged equation of what is no drive, but a mass on a spring.
-fn is_brought_back(finding: &Finding) -> bool {
-    finding
-        .weak
-        .as_ref()
-        .is_some_and(|proof| proof.is_brought_back)
-}
-
 /// Whether a free-run fit tells more of a drive than its averaged equation, which leaves structure.
 fn tells_more(
     (free_run, fitted, mask): (&Finding, &Data, &Mask),
@@ -297,8 +289,8 @@ fn tells_more(
         free_run.error_across_halves(fitted, mask),
         equation.error_across_halves(whole, counted),
     ) {
-        (Some(free), Some(averaged)) if is_brought_back(equation) => free < averaged,
-        (Some(free), Some(averaged)) => free < MUCH_BETTER * averaged,
+        (Some(free), Some(averaged)) if drifts => free < MUCH_BETTER * averaged,
+        (Some(free), Some(averaged)) => free < averaged,
         // What a half does not determine has nothing to say of the other.
         (free, None) => free.is_some(),
         (None, Some(_)) => false,

@@ -61,7 +61,7 @@ pub(crate) fn explain_equations(
     };
     let mut explanation = explain_plant(&found.plant, &logs, recordings, &options).ok()?;
     explanation.summary.push(format!(
-        "The simulated outputs follow equations with {}, to {:.2} % of what the recording differs by; these were changed.",
+        "The simulated outputs follow equations with {}, to {:.2} % of what the recording differs by; this answer is about these equations.",
         counted(found.plant.spec.states().len(), "state"),
         100.0 * found.misfit
     ));
