@@ -107,15 +107,17 @@ fn decide(
     let stays = rivals.iter().any(|r| r.held_out.stays());
     let mut chosen = (0, searches[0].accepted);
     // Where least squares simulates better than the noise allows, a coloured noise stands for what is missing: little may be left
-    // of the likelihood, and much of the free run.
-    let misspecified = rivals
-        .iter()
-        .any(|r| r.accepted == searches[0].accepted && r.misspecified);
+    // of the likelihood, and much of the free run. What least squares refutes is no longer among the rivals, and proves nothing.
+    let is_last = |r: &&Rival| r.accepted == searches[0].accepted;
+    let misspecified = rivals.iter().filter(is_last).any(|r| r.misspecified);
+    let stands = (rivals.iter().filter(is_last)).any(|r| r.estimator == Estimator::Likelihood);
     // With an observer the residuals are white wherever the observer follows: that proves no effect.
+    let free_run = searches[0].fit.form == Form::FreeRun;
     let proved = match searches[0].accepted {
         0 => adequate && !misspecified,
         _ => adequate || little_left && !misspecified,
-    } && searches[0].fit.form == Form::FreeRun;
+    } && stands
+        && free_run;
     if stays && !(judged && holds && proved) {
         let known = rivals
             .iter()
@@ -219,20 +221,19 @@ fn explains(rival: &Rival, other: Option<&Rival>) -> bool {
 
 /// Of the fits of one plant the likelihood's, whose standard deviations hold, unless it simulates worse, in blocks left out or
 /// by more than its noise allows. Least squares stands for it, unless the values of the text simulate better in blocks left out.
+/// A plant to which nothing is added is there to be simulated: of equals least squares comes first.
 fn trusted<'a>(rivals: &[&'a Rival], judged: bool) -> Option<&'a Rival> {
     let least = *rivals.iter().min_by(|a, b| order(a, b))?;
+    let follows = |r: &Rival| !judged || r.held_out.over(&least.held_out) <= 1.0 + EQUAL;
     let likelihood = |r: &&&Rival| {
+        let as_good = r.accepted > 0 || least.estimator != Estimator::FreeRun;
         r.estimator == Estimator::Likelihood
-            && (!judged || r.held_out.over(&least.held_out) <= 1.0 + EQUAL && !r.misspecified)
+            && follows(r)
+            && (!judged || as_good && !r.misspecified)
     };
-    let free_run = || {
-        let follows = |r: &&&Rival| {
-            r.estimator == Estimator::FreeRun
-                && (!judged || r.held_out.over(&least.held_out) <= 1.0 + EQUAL)
-        };
-        rivals.iter().find(follows)
-    };
-    let chosen = rivals.iter().find(likelihood).or_else(free_run);
+    let free_run = |r: &&&Rival| r.estimator == Estimator::FreeRun && follows(r);
+    let chosen = rivals.iter().find(likelihood);
+    let chosen = chosen.or_else(|| rivals.iter().find(free_run));
     Some(chosen.copied().unwrap_or(least))
 }
 
