@@ -6,6 +6,7 @@ use super::document::explain_error::ExplainError;
 use super::effects::{self, Definition};
 use super::explanation::{Explanation, Verdict};
 use super::linear::answer::linear_answer::Answer;
+use super::linear::answer::probability::is_unlikely;
 use super::linear::check::Checked;
 use super::linear::data::Data;
 use super::linear::decision::averaged_decision::attempt;
@@ -17,7 +18,7 @@ use super::linear::screening::output_adequacy::LEVEL;
 use super::memory;
 use super::simulation::Simulation;
 use crate::log::Log;
-use crate::noise::Mask;
+use crate::noise::{Mask, effective_samples};
 
 /// What can be asked for.
 #[derive(Debug, Clone, Default)]
@@ -31,6 +32,9 @@ pub struct Options {
 /// A free-run fit of a drive whose errors add up must run through the half of the recording that it was not fitted to with an error
 /// this many times that of the averaged equation to stand in its place: it follows its own half better always, and knows no mass.
 const MUCH_BETTER: f64 = 0.5;
+
+/// Share of a free run's errors that are independent from which on they are no drift.
+const INDEPENDENT: f64 = 0.5;
 
 /// What the averaged equation of a drive leaves is mostly noise below this share of structure.
 const MOSTLY_NOISE: f64 = 0.5;
@@ -216,7 +220,7 @@ fn explain_nonlinear(
     let found = found.ok_or_else(|| no_fit(checked))?;
     let mut explanation = said(&known, checked, found, options.seed);
     explanation.summary.push(
-        "The simulator is not linear, and no equations were found that reproduce its columns closely: this answer is relative to the columns."
+        "Neither a linear plant nor equations were found that reproduce the simulated columns closely: this answer is relative to the columns."
             .to_owned(),
     );
     // A doubtful answer relative to the columns stands against effects of the sensors, which need no equations, and against
@@ -246,6 +250,9 @@ fn said(
     (mut finding, mask): (Finding, Mask),
     seed: u64,
 ) -> Explanation {
+    if is_unlikely(&finding) {
+        finding.verdict = Verdict::Unexplained;
+    }
     finding.add(checked.troubles.clone());
     Answer {
         recordings: &checked.recordings,
@@ -276,9 +283,18 @@ fn tells_more(
     match equation.verdict {
         Verdict::Named => {}
         // Where neither has a name, the free run tells what the recording would have shown; but the structure that a drifting
-        // one leaves may be its drift, and the equation knows the mass.
+        // one leaves may be its drift, and the equation knows the mass. What leaves white noise does not drift.
         Verdict::Parameters | Verdict::Consistent => {
-            return !drifts || matches!(free_run.verdict, Verdict::Named | Verdict::Family);
+            let white = || {
+                let values = mask.iter().flatten().filter(|counts| **counts).count();
+                let independent = effective_samples(&free_run.model.residual, mask);
+                independent > INDEPENDENT * values as f64
+            };
+            return match free_run.verdict {
+                Verdict::Named | Verdict::Family => true,
+                Verdict::Parameters => !drifts || white(),
+                _ => !drifts,
+            };
         }
         Verdict::Family | Verdict::Unexplained => return true,
     }

@@ -22,6 +22,7 @@ mod plant_hypotheses;
 mod plant_initial_states;
 mod plant_long;
 
+mod plant_parameters;
 mod plant_parts;
 mod plant_search;
 mod plant_sparse;

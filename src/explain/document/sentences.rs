@@ -49,6 +49,8 @@ pub(crate) fn number(value: f64) -> String {
 
 /// An uncertainty so many times its value says that the recording hardly determines it.
 const HARDLY: f64 = 10.0;
+/// Probability by chance from which on what is left is called noise.
+const WHITE: f64 = 0.01;
 
 /// `0.42 +- 0.03 N`.
 pub(crate) fn quantity(q: &Quantity) -> String {
@@ -197,10 +199,14 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
                 f(heldout.augmented.fit_percent)
             ),
         };
+        // Where tests find something in what is left, it is not noise alone.
+        let allows = match e.remaining.p_value >= WHITE {
+            true => format!("; noise allows {}", f(heldout.noise_floor.fit_percent)),
+            false => String::new(),
+        };
         lines.push(format!(
-            "Fit of {} on blocks that were never fitted: {steps}; noise allows {}.",
-            e.fit.output,
-            f(heldout.noise_floor.fit_percent)
+            "Fit of {} on blocks that were never fitted: {steps}{allows}.",
+            e.fit.output
         ));
     }
     if let (Verdict::Parameters, true) = (e.verdict, !e.parameters.is_empty()) {

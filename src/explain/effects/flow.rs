@@ -39,7 +39,7 @@ pub(super) static ENTRIES: &[Definition] = &[
         }],
         linear: &[],
         persists: true,
-        action: Action::Force(orifice, Needs::Position, Sense::Either),
+        action: Action::Force(orifice, Needs::Position, Sense::Drives),
         starts: supplies,
     },
 ];

@@ -129,6 +129,8 @@ impl Parameter {
 pub(crate) enum Sense {
     /// It only resists: friction dissipates, a stop pushes back.
     Resists,
+    /// It acts as the input does that it grows with: a flow through an opening enters from where the pressure is higher.
+    Drives,
     /// Either way.
     Either,
 }
@@ -140,6 +142,8 @@ pub(crate) enum Needs {
     Position,
     /// A velocity.
     Rate,
+    /// What changes a velocity.
+    Acceleration,
     /// Nothing: time alone.
     Time,
 }
@@ -165,7 +169,7 @@ pub(crate) enum Action {
     Input(InputLaw),
     /// A force through a direction.
     Force(ForceLaw, Needs, Sense),
-    /// A force minus the position or the rate, which becomes part of the plant.
+    /// A force minus the position, the rate or the acceleration, which becomes part of the plant.
     Linear(Needs),
     /// Changes an output channel.
     Sensor(ChannelLaw),

@@ -1,8 +1,8 @@
 //! Not physics that was left out, but physics with another number: what a simulation may have slightly wrong.
 //!
-//! A wrong gain, stiffness or damping is one number each. Without them among the boring explanations, an effect that
-//! degenerates to one of them (a stop at the origin is a spring) would win by having fewer numbers than a whole new
-//! plant.
+//! A wrong gain, stiffness, damping or mass is one number each. Without them among the boring explanations, an effect that
+//! degenerates to one of them (a stop at the origin is a spring, a mass that changes at the beginning is another mass)
+//! would win by having fewer numbers than a whole new plant.
 
 use super::{Action, Clock, Definition, Moments, Needs, Parameter, Unit};
 
@@ -41,6 +41,18 @@ pub(super) static ENTRIES: &[Definition] = &[
         linear: &[],
         persists: true,
         action: Action::Linear(Needs::Rate),
+        starts: |_| Vec::new(),
+    },
+    Definition {
+        id: "linear_inertia",
+        variant: "",
+        name: "mass",
+        equation: "F = -dm a",
+        parameters: &[],
+        mimics: &[],
+        linear: &[],
+        persists: true,
+        action: Action::Linear(Needs::Acceleration),
         starts: |_| Vec::new(),
     },
 ];

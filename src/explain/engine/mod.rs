@@ -7,6 +7,7 @@ pub(crate) mod fitting;
 pub(crate) mod holdout;
 pub(crate) mod hypothesis;
 pub(crate) mod long_recordings;
+pub(crate) mod misled;
 mod named_alone;
 pub(crate) mod scope;
 pub(crate) mod screening;

@@ -40,6 +40,8 @@ pub(crate) struct Found {
     pub(crate) map: Option<EquationMap>,
     /// Free runs in blocks that the fit had not seen, without and with the effects; none where the plant does not run freely.
     pub(crate) held_out: Option<[HeldOut; 2]>,
+    /// Whether free runs mislead and prove nothing.
+    pub(crate) misled: bool,
     /// Values that were searched, and what part of long recordings they are.
     pub(crate) values: usize,
     pub(crate) part: Option<Searched>,
@@ -108,12 +110,13 @@ impl Found {
 }
 
 /// What blocks left out say of free runs, where values that depend on each other make a criterion weak: a candidate that the
-/// criterion does not speak against is accepted if it takes more than half of the mean square off them, and named where it takes
+/// criterion speaks for more than chance does is accepted if it takes more than half of the mean square off them, and named where it takes
 /// as much off what any other function leaves.
 /// One that halves what the best leaves comes before it. What depends on time alone is not accepted so: its value in a block is a
 /// level that any slow error has.
 fn judge_by_blocks(
     fitted: &mut [Fitted],
+    tests: usize,
     (plant, fit): (&Plant, &Fit),
     recordings: &[PlantRecording],
     hold: Hold,
@@ -133,7 +136,10 @@ fn judge_by_blocks(
         of(&fitted[i]) != of(&fitted[j])
     };
     let explains = |errors: &HeldOut| errors.follows() && errors.removed(&without) >= EXPLAINED;
-    let provable = |i: usize| fitted[i].gain > 0.0 && fitted[i].lead.term.needs != Needs::Time;
+    // Of so many tests the largest gains about that much by chance (the maximum of as many chi-squares with one degree of freedom).
+    let by_chance = 2.0 * (tests.max(1) as f64).ln();
+    let provable =
+        |i: usize| fitted[i].gain > by_chance && fitted[i].lead.term.needs != Needs::Time;
     let mut chosen: Option<&(usize, HeldOut)> = None;
     for candidate @ (i, errors) in &judged {
         let better = match chosen {
@@ -275,7 +281,7 @@ pub(crate) fn search(
             }
         };
         if least_squares {
-            judge_by_blocks(&mut fitted, (&now, &fit), recordings, hold);
+            judge_by_blocks(&mut fitted, strongest.1, (&now, &fit), recordings, hold);
         }
         for &i in &open {
             let trial = fitted.iter().find(|f| f.hypothesis == Some(i));
@@ -352,6 +358,7 @@ pub(crate) fn search(
         options,
         information: 1.0,
         held_out: None,
+        misled: false,
         values,
         part: None,
         map: first_map,

@@ -11,6 +11,7 @@ use crate::explain::engine::holdout::{
     EXPLAINED, Estimator, HeldOut, SATISFACTORY, all_free, as_given, free_run_error, held_out,
 };
 use crate::explain::engine::long_recordings::part;
+use crate::explain::engine::misled::{has_feedback, integrates};
 use crate::explain::engine::named_alone::named_alone;
 use crate::explain::engine::scope::Scope;
 use crate::explain::engine::search::{Found, Objective, search};
@@ -88,11 +89,15 @@ fn decide(
     hold: Hold,
     scope: &Scope,
 ) -> Result<Found, EstimateError> {
-    let likely = search(plant, recordings, hold, scope, Objective::Likelihood, None)?;
+    let mut likely = search(plant, recordings, hold, scope, Objective::Likelihood, None)?;
     let mut rivals = rivals(&likely, 0, recordings, hold);
     let Some(without) = best(&rivals, |r| r.accepted == 0) else {
         return Ok(likely);
     };
+    let study = Study::new(&likely.plant, recordings, &likely.options)?;
+    let follows = 1.0 - without.whole.powi(2) > SATISFACTORY;
+    likely.misled = has_feedback(&study, &likely.fit, recordings, hold)
+        || !follows && integrates(&likely.plant, &study, &likely.fit, recordings);
     let whole = best(&rivals, |r| r.accepted == likely.accepted);
     let holds = whole.is_some_and(|w| w.held_out.over(&without.held_out) <= 1.0 + EQUAL)
         && !worsens(&rivals, 0, likely.accepted);
@@ -104,7 +109,7 @@ fn decide(
     let mut searches = vec![likely];
     // An unstable plant does not run freely: its likelihood has no judge. A stable one may follow once an effect is found.
     let mut judged = rivals.iter().any(|r| r.held_out.follows());
-    let stays = rivals.iter().any(|r| r.held_out.stays());
+    let stays = !searches[0].misled && rivals.iter().any(|r| r.held_out.stays());
     let mut chosen = (0, searches[0].accepted);
     // Where least squares simulates better than the noise allows, a coloured noise stands for what is missing: little may be left
     // of the likelihood, and much of the free run. What least squares refutes is no longer among the rivals, and proves nothing.

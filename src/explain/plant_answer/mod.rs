@@ -157,9 +157,11 @@ impl Answer<'_> {
         let p_value = (tests as f64 * chance(statistic)).min(1.0);
         let adequate = p_value >= CHANCE;
         // Of a plant that follows worse than the mean most terms take half the error: what is found must follow. A plant that
-        // does not run freely has no blocks that say so.
+        // does not run freely has no blocks that say so, and where they mislead they prove nothing.
+        let misled = self.found.misled;
         let (follows, explains, relied_on) = match &self.found.held_out {
             None => (true, false, true),
+            Some([without, with]) if misled => (true, false, with.explains_every_output(without)),
             Some([without, with]) => {
                 let closely = with.follows_closely();
                 let removes = with.removed(without) >= EXPLAINED;
@@ -214,8 +216,9 @@ impl Answer<'_> {
         each.sort_by(|a, b| percent(a).total_cmp(&percent(b)));
         let strays = self.strays(&each);
         let baseline = (&self.base, &self.found.baseline);
-        let astray =
-            effects.is_empty() && is_astray(&each, strays, self.plant, baseline, self.recordings);
+        let astray = effects.is_empty()
+            && !misled
+            && is_astray(&each, strays, self.plant, baseline, self.recordings);
         let (differs, together) = match effects.is_empty() && parameters.is_empty() {
             true => self.differs(),
             false => (Differs::Parameters, None),

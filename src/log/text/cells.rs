@@ -2,8 +2,9 @@
 
 use super::decimal::finite;
 
-/// Words for a value that is not there. An infinity is none of them: it is what a sensor beyond its range gives.
-const MISSING: [&str; 26] = [
+/// Words for a value that is not there, also those that plant historians write in its place (system digital states). An infinity is
+/// none of them: it is what a sensor beyond its range gives.
+const MISSING: [&str; 38] = [
     "",
     "nan",
     "-nan",
@@ -30,12 +31,26 @@ const MISSING: [&str; 26] = [
     "\\n",
     "#value!",
     "#div/0!",
+    "bad input",
+    "bad quality",
+    "comm fail",
+    "i/o timeout",
+    "timeout",
+    "not connect",
+    "no result",
+    "no sample",
+    "scan off",
+    "scan timeout",
+    "shutdown",
+    "pt created",
 ];
+/// Characters of the longest of them.
+const LONGEST: usize = 12;
 
 /// Whether a cell says that there is no value.
 pub(crate) fn is_missing(cell: &str) -> bool {
     // Short ones first: nearly all cells are numbers and end here.
-    if cell.len() > 9 || cell.as_bytes().first().is_some_and(u8::is_ascii_digit) {
+    if cell.len() > LONGEST || cell.as_bytes().first().is_some_and(u8::is_ascii_digit) {
         return false;
     }
     let word = cell.to_ascii_lowercase();
@@ -252,7 +267,17 @@ mod tests {
     #[test]
     fn missing_values_have_many_names() {
         for cell in [
-            "", "NaN", "NA", "N/A", "#N/A", "null", "-", "-1.#IND", "#VALUE!",
+            "",
+            "NaN",
+            "NA",
+            "N/A",
+            "#N/A",
+            "null",
+            "-",
+            "-1.#IND",
+            "#VALUE!",
+            "I/O Timeout",
+            "Pt Created",
         ] {
             assert!(is_missing(cell), "{cell}");
         }

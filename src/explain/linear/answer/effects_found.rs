@@ -364,13 +364,20 @@ impl Answer<'_> {
             .collect();
         let gain = self.finding.gain;
         let unexplained = self.finding.verdict == Verdict::Unexplained;
+        // A name is left out although nothing is left beside it.
+        let unlikely = unexplained && self.finding.adequacy.is_none_or(|a| a.holds());
         self.finding
             .rivals
             .iter()
             .filter(|r| unexplained || !named.contains(&r.definition.id))
             .take(12)
             .map(|r| {
-                let why_not = if unexplained {
+                let why_not = if unlikely && named.contains(&r.definition.id) {
+                    format!(
+                        "of names that lead by so little two of three are wrong (evidence {})",
+                        sentences::number(r.gain)
+                    )
+                } else if unexplained {
                     format!(
                         "it leaves structure that noise does not make (evidence {})",
                         sentences::number(r.gain)

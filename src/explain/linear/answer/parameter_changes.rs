@@ -12,6 +12,8 @@ use crate::model::StateSpace;
 
 /// A change is listed when it is this many of its standard deviations.
 const CHANGED: f64 = 2.0;
+/// Where a standard deviation is not known, a change is listed when it is this share of the value.
+const SHOWN: f64 = 1e-3;
 /// Difference step of the delta method, in standard deviations of each number.
 const STEP: f64 = 0.1;
 /// A pole whose time constant is longer than this many recordings is an integrator.
@@ -34,31 +36,45 @@ impl Answer<'_> {
             return Vec::new();
         }
         let before = self.properties(&known.plant(&known.given()));
-        let after = self.properties(&effective(structure, &model.theta));
-        let covariance = model.clone().certainty(problem).map(|c| c.covariance);
-        let deviations = covariance.map(|c| self.deviations(model, &c, &after));
-        let mut changes = Vec::new();
-        for (i, now) in after.iter().enumerate() {
-            let Some(was) = before.iter().find(|p| p.name == now.name) else {
-                continue;
-            };
-            let std = deviations
-                .as_ref()
-                .map(|d| d[i])
-                .filter(|s| s.is_finite() && *s > 0.0);
-            let finite = was.value.is_finite() && now.value.is_finite();
-            let moved = std.is_none_or(|std| (now.value - was.value).abs() > CHANGED * std);
-            if finite && moved {
-                changes.push(ParameterChange {
+        let (listed, stds) = self.estimated(problem, model);
+        // Few numbers that stand for many are known too well: what the recording says of each number is what the fit of all says.
+        let full = &self.finding.boring.full;
+        let is_restricted = !structure.plant_free && structure.new_effects().is_empty();
+        let all = (is_restricted && full.structure.plant_free)
+            .then(|| self.estimated(problem, full))
+            .filter(|(list, stds)| {
+                list.iter()
+                    .zip(stds)
+                    .any(|(now, std)| moved(&before, now, *std))
+            });
+        let (listed, stds) = all.unwrap_or((listed, stds));
+        let changed = listed.iter().zip(&stds);
+        changed
+            .filter(|(now, std)| moved(&before, now, **std))
+            .filter_map(|(now, std)| {
+                let was = before.iter().find(|p| p.name == now.name)?;
+                Some(ParameterChange {
                     name: now.name.clone(),
                     simulation: was.value,
                     recording: now.value,
-                    std,
+                    std: *std,
                     unit: now.unit.clone(),
-                });
-            }
-        }
-        changes
+                })
+            })
+            .collect()
+    }
+
+    /// Properties of the plant of a fit, and their standard deviations.
+    fn estimated(&self, problem: &Problem, fit: &Fit) -> (Vec<Property>, Vec<Option<f64>>) {
+        let properties = self.properties(&effective(&fit.structure, &fit.theta));
+        let covariance = fit.clone().certainty(problem).map(|c| c.covariance);
+        let stds = covariance.map(|c| self.deviations(fit, &c, &properties));
+        let known = |i: usize| {
+            let std = stds.as_ref().map(|s| s[i]);
+            std.filter(|s| s.is_finite() && *s > 0.0)
+        };
+        let stds = (0..properties.len()).map(known).collect();
+        (properties, stds)
     }
 
     /// Standard deviations of the properties of `model`.
@@ -173,6 +189,16 @@ impl Answer<'_> {
         }
         found
     }
+}
+
+/// Whether a property differs from what it was by more than chance allows.
+fn moved(before: &[Property], now: &Property, std: Option<f64>) -> bool {
+    before.iter().any(|was| {
+        let finite = was.value.is_finite() && now.value.is_finite();
+        let change = (now.value - was.value).abs();
+        let least = std.map_or(SHOWN * was.value.abs(), |std| CHANGED * std);
+        was.name == now.name && finite && change > least
+    })
 }
 
 /// The plant with what was adjusted beside it: gains of the inputs, springs and dampers.

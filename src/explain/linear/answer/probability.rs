@@ -52,6 +52,15 @@ const MOST_NOISE: f64 = 0.1;
 /// More is not stated: recordings hold effects that nobody drew.
 const MOST: f64 = 0.99;
 
+/// Probability below which a name is not given: two of three such names are wrong.
+const UNLIKELY: f64 = 1.0 / 3.0;
+
+/// Whether a name is more than twice as likely wrong as right.
+pub(crate) fn is_unlikely(finding: &Finding) -> bool {
+    let stated = || 1.0 / (1.0 + (-named(finding)).exp());
+    finding.verdict == Verdict::Named && finding.weak.is_none() && stated() < UNLIKELY
+}
+
 /// Probability that the answer is right; `fit` is the table that is shown beside it.
 pub(crate) fn probability(finding: &Finding, fit: &FitTable) -> f64 {
     let logit = match finding.verdict {

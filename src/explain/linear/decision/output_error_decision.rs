@@ -20,7 +20,7 @@ use crate::explain::linear::search::plausibility::{add_free_twins, plant_may_sta
 use crate::explain::linear::search::richer_laws::{
     FURTHER, REFINEMENTS, decides_within, derived, finer_steps,
 };
-use crate::explain::linear::search::single_effects::{Ranked, single_effects};
+use crate::explain::linear::search::single_effects::{Ranked, fit_lead, single_effects};
 use crate::noise::Mask;
 
 /// Names whose criteria differ by less explain the recording equally well (Kass and Raftery 1995: 6 is "strong").
@@ -148,7 +148,6 @@ pub(crate) fn inquire(
     if let Some(direct) = with_feedthrough(&problem, &boring.full) {
         boring.full = direct;
     }
-    let mut base = boring.best(count).criterion(count);
     // A plant that is known as well as a recording of this length tells costs next to nothing: its numbers are looked for
     // within their uncertainty, not anywhere.
     let known_plant =
@@ -161,9 +160,14 @@ pub(crate) fn inquire(
                     .is_some_and(|p| p > SAME_PLANT)
             })
     };
-    if same_plant(&boring.full) {
-        base = base.min(boring.full.criterion(count) - known_plant);
-    }
+    let least = |boring: &Boring| {
+        let least = boring.best(count).criterion(count);
+        match same_plant(&boring.full) {
+            true => least.min(boring.full.criterion(count) - known_plant),
+            false => least,
+        }
+    };
+    let mut base = least(&boring);
     let coarse = if allowed(effects::find("sensor_quantization", "")?) {
         coarse_sensor(data, &boring.best(count).residual, &problem.mask)
     } else {
@@ -192,6 +196,10 @@ pub(crate) fn inquire(
         return Some((finding, problem.mask));
     }
     let mut ranked = single_effects(&problem, &finding.boring, allowed);
+    if finding.boring.improve_from(&problem, &ranked) {
+        base = least(&finding.boring);
+        finding.model = finding.boring.best(count).clone();
+    }
     for refinements in [REFINEMENTS, FURTHER] {
         ranked.extend(derived(&problem, refinements, &ranked, base, allowed));
     }
@@ -336,6 +344,12 @@ pub(crate) fn inquire(
                 finding.boring.near = full.clone();
             }
         }
+        let as_given = finding.boring.given.criterion(count) <= base + 1e-9;
+        let refused = as_given && finding.boring.refuses_given();
+        if refused {
+            finding.model = finding.boring.full.clone();
+            finding.boring.near = finding.boring.full.clone();
+        }
         // Rounding is no noise: what it makes up may show as structure.
         let rounded = coarse.map_or(0.0, |(_, _, share)| share);
         let holds = finding
@@ -345,9 +359,7 @@ pub(crate) fn inquire(
             Verdict::Unexplained
         } else if !finding.freezes.is_empty() || finding.coarse.is_some() {
             Verdict::Named
-        } else if finding.boring.given.criterion(count) <= base + 1e-9
-            || is_as_identified(known, &problem, &finding.boring)
-        {
+        } else if as_given && !refused || is_as_identified(known, &problem, &finding.boring) {
             Verdict::Consistent
         } else {
             Verdict::Parameters
@@ -399,7 +411,13 @@ fn in_one_recording_each(problem: &Problem, ranked: &[Ranked], base: f64) -> Vec
     let definition = |r: &Ranked| r.fit.structure.new_effects()[0].definition.id;
     for r in ranked {
         let single = r.fit.structure.new_effects().len() == 1;
-        if best.len() < IN_ONE && single && best.iter().all(|b| definition(b) != definition(r)) {
+        // What changes at a time that is not that of the other recordings explains nothing of all.
+        let wanted = best.len() < IN_ONE
+            || r.fit
+                .structure
+                .change_time(r.fit.structure.first_new())
+                .is_some();
+        if wanted && single && best.iter().all(|b| definition(b) != definition(r)) {
             best.push(r);
         }
     }
@@ -432,16 +450,40 @@ fn in_one_recording(problem: &Problem, fit: &Fit) -> Option<Fit> {
                 recording: Some(recording),
                 ..fit.structure.clone()
             };
-            Fit::run(
-                problem,
-                structure,
-                fit.theta.clone(),
-                Some(&fit.noise),
-                Effort::FINAL,
-            )
+            let starts = starts_of_change(problem, &structure, &fit.theta, recording);
+            let glanced = starts.into_iter().filter_map(|start| {
+                let noise = Some(&fit.noise);
+                Fit::run(problem, structure.clone(), start, noise, Effort::GLANCE)
+            });
+            let best = glanced.min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
+            fit_lead(problem, best.structure, best.theta, Effort::FINAL)
         })
         .min_by(|a, b| a.criterion(count).total_cmp(&b.criterion(count)))
         .filter(|one| one.criterion(count) + owed < fit.criterion(count))
+}
+
+/// Times that are tried for a change in one recording.
+const CHANGES_TRIED: usize = 12;
+
+/// Where the fit of an effect in one recording starts: what changes at a time may do so at any time of it, not at the one that all
+/// recordings together have shown.
+fn starts_of_change(
+    problem: &Problem,
+    structure: &Structure,
+    theta: &[f64],
+    recording: usize,
+) -> Vec<Vec<f64>> {
+    let mut starts = vec![theta.to_vec()];
+    if let Some(at) = structure.change_time(structure.first_new()) {
+        let segment = &problem.data.segments[recording];
+        let length = segment.samples() as f64 * problem.data.sample_time;
+        starts.extend((1..=CHANGES_TRIED).map(|i| {
+            let mut start = theta.to_vec();
+            start[at] = segment.start_time + length * i as f64 / (CHANGES_TRIED + 1) as f64;
+            start
+        }));
+    }
+    starts
 }
 
 /// What blocks that were not fitted must show of a gain of which `expected` falls to their share: twice a log

@@ -103,6 +103,28 @@ impl Plant {
         }
     }
 
+    /// Takes up a force through `direction` that is minus the change of `row x` over a sample interval, per second: what a mass needs
+    /// to be accelerated.
+    pub(crate) fn add_inertia(&mut self, direction: &[f64], row: &[f64]) {
+        let (n, r) = (self.states, self.inputs);
+        let after = |matrix: &[f64], columns: usize, column: usize| -> f64 {
+            (0..n).map(|i| row[i] * matrix[i * columns + column]).sum()
+        };
+        let h = self.sample_time;
+        let on_state: Vec<f64> = (0..n)
+            .map(|j| (after(&self.a, n, j) - row[j]) / h)
+            .collect();
+        let on_input: Vec<f64> = (0..r).map(|j| after(&self.b, r, j) / h).collect();
+        for (i, d) in direction.iter().enumerate() {
+            for (a, row) in self.a[i * n..(i + 1) * n].iter_mut().zip(&on_state) {
+                *a -= d * row;
+            }
+            for (b, row) in self.b[i * r..(i + 1) * r].iter_mut().zip(&on_input) {
+                *b -= d * row;
+            }
+        }
+    }
+
     /// The same input-output behaviour in the state `T x`.
     pub(crate) fn transformed(&self, t: &DMatrix<f64>, t_inverse: &DMatrix<f64>) -> Self {
         Self {

@@ -341,7 +341,9 @@ impl Bench<'_> {
                 (Needs::Rate, place @ Signal::Integral(_)) => {
                     drive() || rows.sensible(&self.plant, place)
                 }
-                (Needs::Position | Needs::Rate, place) => rows.sensible(&self.plant, place),
+                (Needs::Position | Needs::Rate | Needs::Acceleration, place) => {
+                    rows.sensible(&self.plant, place)
+                }
             };
             if !possible {
                 continue;

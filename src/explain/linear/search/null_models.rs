@@ -1,11 +1,17 @@
 //! Null models: the simulation as given, with other initial states, with other parameters, and no missing physics.
 
 use rayon::prelude::*;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::explain::effects;
 use crate::explain::linear::fit::{Effort, Fit, Problem};
 use crate::explain::linear::model::functionals::{Functionals, Signal};
 use crate::explain::linear::model::structure::{Direction, Instance, Structure};
+use crate::explain::linear::search::penalties::NEEDED;
+use crate::explain::linear::search::single_effects::Ranked;
+
+/// Probability by chance below which other parameters are certain. Slow noise makes a likelihood ratio larger than its law says.
+const REFUSED: f64 = 1e-6;
 
 /// The explanations without new physics.
 #[derive(Debug, Clone)]
@@ -14,7 +20,7 @@ pub(crate) struct Boring {
     pub(crate) given: Fit,
     /// With other initial states, if the criterion allows.
     pub(crate) strict: Fit,
-    /// The plant as given, with what the criterion allows of other initial states, gains, stiffness and damping.
+    /// The plant as given, with what the criterion allows of other initial states, gains, stiffness, damping and mass.
     pub(crate) near: Fit,
     /// With other parameters and initial states.
     pub(crate) full: Fit,
@@ -81,6 +87,37 @@ impl Boring {
         })
     }
 
+    /// Takes over what fits with an effect show of the other numbers: without the effect they may be a better null model than was
+    /// found, and what was gained by them is no evidence of the effect. Whether anything was better.
+    pub(crate) fn improve_from(&mut self, problem: &Problem, candidates: &[Ranked]) -> bool {
+        let count = problem.count();
+        let least = self.best(count).criterion(count);
+        let promising: Vec<&Ranked> = (candidates.iter())
+            .filter(|r| least - r.criterion > NEEDED && !r.fit.structure.is_tanks())
+            .collect();
+        let better: Vec<Fit> = promising
+            .into_par_iter()
+            .filter_map(|r| without_effects(problem, &r.fit))
+            .filter(|fit| fit.criterion(count) < least)
+            .filter_map(|fit| fit.improved(problem, Effort::FINAL))
+            .collect();
+        for fit in better {
+            match fit.structure.plant_free {
+                true => self.full.better_of(fit, count),
+                false => self.near.better_of(fit, count),
+            }
+        }
+        self.best(count).criterion(count) < least
+    }
+
+    /// Whether the likelihood ratio refuses the simulation as given, although a criterion that counts every number of the plant prefers
+    /// it: of many numbers few may have changed.
+    pub(crate) fn refuses_given(&self) -> bool {
+        let more = self.full.free.saturating_sub(self.given.free).max(1);
+        let gained = (self.given.deviance - self.full.deviance).max(0.0);
+        ChiSquared::new(more as f64).is_ok_and(|law| law.sf(gained) < REFUSED)
+    }
+
     /// The one with the least criterion.
     pub(crate) fn best(&self, count: usize) -> &Fit {
         if self.full.criterion(count) < self.near.criterion(count) {
@@ -89,6 +126,15 @@ impl Boring {
             &self.near
         }
     }
+}
+
+/// The other numbers of a fit, without its effects.
+fn without_effects(problem: &Problem, fit: &Fit) -> Option<Fit> {
+    let mut structure = fit.structure.clone();
+    let first = structure.first_new();
+    let theta = fit.theta[..structure.effect_offset(first)].to_vec();
+    structure.effects.truncate(first);
+    Fit::at(problem, structure, theta)
 }
 
 /// Other parameters about an operating point: where a plant with other gains is linear about a level, its outputs are
@@ -135,14 +181,15 @@ fn about_an_operating_point(problem: &Problem, given: &Structure, full: &Fit) ->
 }
 
 /// Most numbers that are adjusted together.
-const MOST_ADJUSTED: usize = 6;
+const MOST_ADJUSTED: usize = 8;
 
-/// Sets of adjustments that are tried: gains; gains, stiffness and damping.
+/// Sets of adjustments that are tried: gains; gains, stiffness, damping and mass.
 fn adjustments(problem: &Problem, structure: &Structure) -> Vec<Vec<Instance>> {
-    let (Some(gain), Some(stiffness), Some(damping)) = (
+    let (Some(gain), Some(stiffness), Some(damping), Some(inertia)) = (
         effects::find("input_gain", ""),
         effects::find("linear_stiffness", ""),
         effects::find("linear_damping", ""),
+        effects::find("linear_inertia", ""),
     ) else {
         return Vec::new();
     };
@@ -172,7 +219,7 @@ fn adjustments(problem: &Problem, structure: &Structure) -> Vec<Vec<Instance>> {
             Signal::Output(output)
         };
         for &input in &inputs {
-            for definition in [stiffness, damping] {
+            for definition in [stiffness, damping, inertia] {
                 forces.push(Instance {
                     definition,
                     channel: input,

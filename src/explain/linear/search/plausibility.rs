@@ -15,6 +15,7 @@ use crate::explain::effects::{self, Action, Sense, Unit};
 use crate::explain::linear::fit::{Effort, Fit, Problem};
 use crate::explain::linear::identification::step_response_test::Uncertainty;
 use crate::explain::linear::model::functionals::{Functionals, Signal, dot};
+use crate::explain::linear::model::structure::Direction;
 
 /// Probability of a larger difference when the plant is as it was given.
 const SAME_PLANT: f64 = 1e-3;
@@ -165,7 +166,16 @@ pub(crate) fn sane(problem: &Problem, fit: &Fit) -> bool {
         if let Action::Force(_, _, sense) = effect.definition.action {
             let signal = rows.of(&plant, effect.signal);
             let direction = fit.structure.direction(&fit.theta, &plant, &rows, index);
-            if sense == Sense::Resists && dot(&signal.forward, &direction) <= 0.0 {
+            let pushes = dot(&signal.forward, &direction);
+            if sense == Sense::Resists && pushes <= 0.0 {
+                return false;
+            }
+            let input = match effect.direction {
+                Direction::Matched(input) => input,
+                Direction::Free => effect.channel,
+            };
+            let driven = || dot(&signal.forward, &plant.b_column(input));
+            if sense == Sense::Drives && pushes * driven() <= 0.0 {
                 return false;
             }
         }

@@ -1,14 +1,13 @@
 //! Whether a free run without an effect is too poor for "nothing is missing" to be said of it.
 
 use crate::explain::engine::holdout::SATISFACTORY;
+use crate::explain::engine::misled::growth;
 use crate::explain::explanation::OutputFit;
 use crate::physics::Plant;
 use crate::physics::estimate::{Fit, PlantRecording, Study};
 
 /// A free run that leaves more of an output than so many one-step errors strays: with this noise what is slow explains most of it.
 pub(in crate::explain::plant_answer) const STRAYS: f64 = 2.0;
-/// Samples of a recording at which a plant is linearised.
-const LOOKED_AT: usize = 16;
 
 /// Whether the free run of an output leaves half of its variance, and far more than predictions of the next sample do or would: a
 /// noise model or an observer has taken over what the equations should do, or nothing has. Of an unstable plant that its inputs hold
@@ -38,27 +37,5 @@ pub(in crate::explain::plant_answer) fn is_astray(
 
 /// Whether a small difference grows more than e-fold over a recording, by the poles along it.
 fn is_unstable(plant: &Plant, study: &Study, fit: &Fit, recordings: &[PlantRecording]) -> bool {
-    let Some(trajectories) = study.trajectories(fit) else {
-        return true;
-    };
-    if plant.spec.states().is_empty() {
-        return false;
-    }
-    let points = study.points(fit);
-    let mut each = trajectories.iter().zip(recordings).zip(points);
-    each.any(|((trajectory, recording), point)| {
-        let samples = recording.samples();
-        let mut lineariser = plant.lineariser(&point);
-        let every = (samples / LOOKED_AT).max(1);
-        let (mut growth, mut looked_at) = (0.0, 0.0);
-        for k in (0..samples).step_by(every) {
-            let state: Vec<f64> = trajectory.states.iter().map(|x| x[k]).collect();
-            let inputs: Vec<f64> = recording.inputs.iter().map(|u| u[k]).collect();
-            let time = recording.start_time + k as f64 * recording.sample_time;
-            let poles = lineariser.at(&state, &inputs, time).a.complex_eigenvalues();
-            growth += poles.iter().map(|p| p.re).fold(f64::NEG_INFINITY, f64::max);
-            looked_at += 1.0;
-        }
-        growth / looked_at * samples as f64 * recording.sample_time > 1.0
-    })
+    growth(plant, study, fit, recordings).is_none_or(|growth| growth > 1.0)
 }

@@ -421,6 +421,7 @@ impl Structure {
                 Action::Linear(Needs::Position) => {
                     plant.add_linear_force(&direction, &signal.position, &[]);
                 }
+                Action::Linear(Needs::Acceleration) => plant.add_inertia(&direction, &signal.rate),
                 Action::Linear(_) => {
                     plant.add_linear_force(&direction, &signal.rate, &signal.rate_feedthrough);
                 }
