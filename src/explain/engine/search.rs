@@ -40,7 +40,9 @@ pub(crate) struct Found {
     pub(crate) map: Option<EquationMap>,
     /// Free runs in blocks that the fit had not seen, without and with the effects; none where the plant does not run freely.
     pub(crate) held_out: Option<[HeldOut; 2]>,
-    /// Whether free runs mislead and prove nothing.
+    /// Inputs that react to disturbances: free runs prove no function of them.
+    pub(crate) reacting: Vec<usize>,
+    /// Whether free runs mislead a search, by that or because they add up disturbances.
     pub(crate) misled: bool,
     /// Values that were searched, and what part of long recordings they are.
     pub(crate) values: usize,
@@ -358,6 +360,7 @@ pub(crate) fn search(
         options,
         information: 1.0,
         held_out: None,
+        reacting: vec![],
         misled: false,
         values,
         part: None,

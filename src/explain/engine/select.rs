@@ -11,7 +11,7 @@ use crate::explain::engine::holdout::{
     EXPLAINED, Estimator, HeldOut, SATISFACTORY, all_free, as_given, free_run_error, held_out,
 };
 use crate::explain::engine::long_recordings::part;
-use crate::explain::engine::misled::{has_feedback, integrates};
+use crate::explain::engine::misled::{integrates, reacting_inputs};
 use crate::explain::engine::named_alone::named_alone;
 use crate::explain::engine::scope::Scope;
 use crate::explain::engine::search::{Found, Objective, search};
@@ -96,7 +96,8 @@ fn decide(
     };
     let study = Study::new(&likely.plant, recordings, &likely.options)?;
     let follows = 1.0 - without.whole.powi(2) > SATISFACTORY;
-    likely.misled = has_feedback(&study, &likely.fit, recordings, hold)
+    likely.reacting = reacting_inputs(&study, &likely.fit, recordings, hold);
+    likely.misled = !likely.reacting.is_empty()
         || !follows && integrates(&likely.plant, &study, &likely.fit, recordings);
     let whole = best(&rivals, |r| r.accepted == likely.accepted);
     let holds = whole.is_some_and(|w| w.held_out.over(&without.held_out) <= 1.0 + EQUAL)

@@ -142,6 +142,15 @@ impl Answer<'_> {
         steps.filter_map(|s| s.first())
     }
 
+    /// Whether an effect is a function of an input that reacts to disturbances.
+    fn depends_on_feedback(&self) -> bool {
+        let spec = &self.plant.spec;
+        let name = |i: &usize| Some(spec.variable(*spec.inputs().get(*i)?).column());
+        let reacting: Vec<&str> = self.found.reacting.iter().filter_map(name).collect();
+        let depends = |f: &Fitted| f.depends.iter().any(|d| reacting.contains(&d.as_str()));
+        self.effects().any(depends)
+    }
+
     fn spec_before(&self, step: usize) -> &ModelSpec {
         match step.checked_sub(1) {
             None => &self.plant.spec,
@@ -157,11 +166,11 @@ impl Answer<'_> {
         let p_value = (tests as f64 * chance(statistic)).min(1.0);
         let adequate = p_value >= CHANCE;
         // Of a plant that follows worse than the mean most terms take half the error: what is found must follow. A plant that
-        // does not run freely has no blocks that say so, and where they mislead they prove nothing.
-        let misled = self.found.misled;
+        // does not run freely has no blocks that say so, and they prove no function of an input that reacts to disturbances.
+        let feedback = self.depends_on_feedback();
         let (follows, explains, relied_on) = match &self.found.held_out {
             None => (true, false, true),
-            Some([without, with]) if misled => (true, false, with.explains_every_output(without)),
+            Some([without, with]) if feedback => (true, false, with.explains_every_output(without)),
             Some([without, with]) => {
                 let closely = with.follows_closely();
                 let removes = with.removed(without) >= EXPLAINED;
@@ -217,7 +226,7 @@ impl Answer<'_> {
         let strays = self.strays(&each);
         let baseline = (&self.base, &self.found.baseline);
         let astray = effects.is_empty()
-            && !misled
+            && !self.found.misled
             && is_astray(&each, strays, self.plant, baseline, self.recordings);
         let (differs, together) = match effects.is_empty() && parameters.is_empty() {
             true => self.differs(),

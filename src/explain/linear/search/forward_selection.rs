@@ -7,9 +7,8 @@ use super::plausibility::sane;
 use super::richer_laws::{REFINEMENTS, derived};
 use super::single_effects::{Ranked, second_effects};
 use crate::explain::effects::Definition;
-use crate::explain::linear::data::Series;
 use crate::explain::linear::fit::{Effort, Fit, Problem};
-use crate::noise::{Colours, Noise};
+use crate::noise::inputs_foretold;
 
 /// A second effect must bring this share of what the first brought: misfit of the first breeds false seconds
 /// (math/explain.md, choice 9).
@@ -120,12 +119,6 @@ pub(crate) fn pair(
 /// What a feedthrough must gain to be believed (strong evidence, Kass and Raftery 1995).
 const FEEDTHROUGH_GAIN: f64 = 10.0;
 
-/// Share of an input's innovation variance that fed-back noise makes up at least, where a feedthrough would be misled.
-const FEEDBACK_SHARE: f64 = 0.05;
-
-/// Lags over which feedback would show.
-const FEEDBACK_LAGS: usize = 20;
-
 /// `fit` with the direct feedthrough free, where that gains much and nothing speaks for feedback: under feedback an
 /// input that holds the present noise imitates a feedthrough.
 pub(crate) fn with_feedthrough(problem: &Problem, fit: &Fit) -> Option<Fit> {
@@ -158,32 +151,13 @@ pub(crate) fn with_feedthrough(problem: &Problem, fit: &Fit) -> Option<Fit> {
     (closer && direct.criterion(count) < fit.criterion(count) - FEEDTHROUGH_GAIN).then_some(direct)
 }
 
-/// Whether the residual foretells the inputs: its whitened values correlate with later innovations of an input.
+/// Whether the residual foretells the inputs. What acts within the sample may be the feedthrough that is asked for.
 fn feedback(problem: &Problem, fit: &Fit) -> bool {
     let data = problem.data;
-    let e = fit.noise.whiten(&fit.residual, &problem.mask);
-    (0..data.signals()).any(|j| {
-        let u: Series = data.segments.iter().map(|s| s.inputs[j].clone()).collect();
-        let mask: Vec<Vec<bool>> = u.iter().map(|c| vec![true; c.len()]).collect();
-        let own = Noise::estimate(&u, 1, &mask, Colours::All);
-        let w = own.whiten(&u, &mask);
-        (0..data.outputs).any(|o| {
-            (1..=FEEDBACK_LAGS).any(|lag| {
-                let (mut sum, mut ee, mut ww, mut n) = (0.0, 0.0, 0.0, 0.0);
-                for (s, w) in w.iter().enumerate() {
-                    let e = &e[s * data.outputs + o];
-                    for k in 0..w.len().saturating_sub(lag) {
-                        sum += e[k] * w[k + lag];
-                        ee += e[k] * e[k];
-                        ww += w[k + lag] * w[k + lag];
-                        n += 1.0;
-                    }
-                }
-                // Significant, and as much as a controller makes of it.
-                sum * sum > f64::max(16.0 / f64::max(n, 1.0), FEEDBACK_SHARE) * ee * ww
-            })
-        })
-    })
+    let innovations = fit.noise.whiten(&fit.residual, &problem.mask);
+    let signals = data.signals();
+    let inputs: Vec<&[Vec<f64>]> = data.segments.iter().map(|s| &s.inputs[..signals]).collect();
+    !inputs_foretold(&innovations, &problem.mask, &inputs, 1).is_empty()
 }
 
 /// Decrease of the deviance from `a` to `b` on blocks that neither is fitted to, over their share of all that is fitted:
