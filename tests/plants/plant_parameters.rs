@@ -115,3 +115,41 @@ fn another_resonance_of_an_axis_is_found() {
         assert!((ratio - factor).abs() < 0.015, "{seed}: {ratio}");
     }
 }
+
+/// A mass on a spring that becomes heavier by a quarter: what is said is the mass that was added, in the unit of the input over that
+/// of the acceleration.
+#[test]
+fn the_mass_that_was_added_is_stated() {
+    let mut normal = noise(4);
+    let mut f = 0.0;
+    let force: Vec<f64> = (0..2000)
+        .map(|k| {
+            if k % 30 == 0 {
+                f = 10.0 * normal();
+            }
+            f
+        })
+        .collect();
+    let positions = |added: f64| -> Vec<f64> {
+        let (mut x, mut v) = (0.0, 0.0);
+        let h = 0.02 / STEPS as f64;
+        let each = force.iter().enumerate();
+        each.map(|(k, f)| {
+            let seen = x;
+            let mass = if k < 900 { 2.0 } else { 2.0 + added };
+            for _ in 0..STEPS {
+                v += h * (f - 3.0 * v - 80.0 * x) / mass;
+                x += h * v;
+            }
+            seen
+        })
+        .collect()
+    };
+    let mut recorded = positions(0.5);
+    recorded.iter_mut().for_each(|y| *y += 0.003 * normal());
+    let said = explained(&force, &recorded, &positions(0.0), 0.02);
+    assert_eq!(effects(&said), ["mass_change"], "{}", said["summary"]);
+    let parameters = &said["effects"][0]["parameters"];
+    let mass = parameters["mass_change"]["value"].as_f64().unwrap();
+    assert!((mass - 0.5).abs() < 0.02, "{parameters}");
+}

@@ -12,7 +12,7 @@ use crate::cli::terminal::note;
 use crate::cli::{Outcome, Verbosity};
 use crate::explain::AugmentedPlant;
 use crate::log::{Channel, Log, RoleNeed, Roles, Source, write_table};
-use crate::physics::estimate::{EstimateOptions, Form, PlantRecording, estimate};
+use crate::physics::estimate::{PlantRecording, start_by_least_squares};
 use crate::physics::{Hold, Point};
 use crate::report::{PlantDocument, is_plant};
 
@@ -132,17 +132,10 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
             set_start(&plant, &mut point, &assignments("--initial-state", text)?)?
         }
         Start::Estimate => {
-            let options = EstimateOptions {
-                free: vec![false; point.parameters.len()],
-                hold,
-                form: Some(Form::FreeRun),
-                least_squares: true,
-            };
             let at_values = plant.with_values(&point.parameters);
             let recording = PlantRecording::from(&log);
             tell_missing(&log, &recording, say);
-            let found = estimate(&at_values, &[recording], &options)?;
-            point.start = found.points[0].start.clone();
+            point.start = start_by_least_squares(&at_values, &recording, hold)?;
         }
     }
     if matches!(asked.start, Start::Text) {

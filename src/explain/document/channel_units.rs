@@ -4,7 +4,7 @@ use crate::log::Channel;
 
 /// Ways in which a unit is written, in lower case; the first stands for it.
 const WRITTEN: &[&[&str]] = &[
-    &["deg", "\u{b0}", "degree", "degrees"],
+    &["deg", "\u{b0}", "degree", "degrees", "grad"],
     &["rad", "radian", "radians"],
     &["degC", "degc", "\u{b0}c", "c", "celsius", "grad c"],
     &["K", "k", "kelvin"],
@@ -19,7 +19,7 @@ const SPEEDS: &[&str] = &[
 /// Units of a position or an angle.
 const POSITIONS: &[&str] = &[
     "m", "mm", "um", "\u{b5}m", "cm", "km", "in", "ft", "rad", "radian", "radians", "deg",
-    "\u{b0}", "degree", "degrees",
+    "\u{b0}", "degree", "degrees", "grad",
 ];
 
 /// The unit of a channel in lower case: of its brackets, else what the name ends with behind an underscore.

@@ -59,10 +59,16 @@ fn gain(p: &[f64], u: &mut [f64], _: &mut [Moments], clock: &Clock) {
     }
 }
 
-/// A unit of mass takes the force that accelerates it off the rest.
+/// A mass is never less than this share of what it was.
+const LEAST_MASS: f64 = 0.01;
+
+/// A mass takes the force that accelerates it off the rest, which it makes slower itself: `a = a_free m/(m + dm)`.
 fn inertia(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    let acceleration = (motion.rate_free - motion.rate) / motion.clock.step;
-    -acceleration * motion.clock.share_after(motion.sample, p[0])
+    let free = (motion.rate_free - motion.rate) / motion.clock.step;
+    let share = motion.clock.share_after(motion.sample, p[0]);
+    // What a unit of the force does to the rate over the step is `dm/m` times the step.
+    let heavier = (1.0 + share * motion.rate_gain / motion.clock.step).max(LEAST_MASS);
+    -share * free / heavier
 }
 
 fn stiffness(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {

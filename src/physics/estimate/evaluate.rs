@@ -10,9 +10,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::adequacy::{self, Question, ResidualTest};
 use super::deviance::{Deviance, invert};
+use super::free_run::white_fit;
 use super::optimise::{Range, minimise};
 use super::problem::Problem;
-use super::{EstimateError, EstimateOptions, Form, PlantRecording, ROUND};
+use super::{EstimateError, EstimateOptions, Form, PlantRecording, ROUND, estimate};
 use crate::noise::{Colour, Colours, Noise, kept};
 use crate::physics::simulation::{Hold, Plant, Point};
 
@@ -93,7 +94,7 @@ pub fn evaluate(
         least_squares: false,
     };
     let problem = Problem::new(&plant, recordings, &options)?;
-    let (point, noise, estimated) = initial_states(&problem, held)?;
+    let (point, noise, estimated) = initial_states(&problem, &plant, held)?;
     let form = form(held);
     let mut objective = Deviance::new(&problem, form, noise);
     let (Some(residual), Some(jacobian)) =
@@ -152,6 +153,7 @@ fn form(held: &Held) -> Form {
 /// Free numbers with the initial states that are given or fit best, the noise, and whether that was estimated.
 fn initial_states(
     problem: &Problem,
+    plant: &Plant,
     held: &Held,
 ) -> Result<(Vec<f64>, Noise, bool), EstimateError> {
     let (l, p) = (problem.outputs(), problem.free.len());
@@ -177,6 +179,7 @@ fn initial_states(
     let mut objective = Deviance::new(problem, form(held), Noise::unit(l));
     let searched = held.starts.is_none() && numbers > p;
     if searched {
+        start_where_measured(problem, plant, &mut point);
         search(problem, form(held), &mut point, &ranges).ok_or_else(|| problem.why_not())?;
     }
     let estimated = known.is_none();
@@ -193,6 +196,71 @@ fn initial_states(
         minimise(&mut objective, &mut point, &ranges, ROUND).ok_or_else(|| problem.why_not())?;
     }
     Ok((point, objective.noise, estimated))
+}
+
+/// The initial state of a recording by least squares of the free run, with the parameters of the plant: one value for each state, in its
+/// unit, `None` where that of the text is certain. The search starts from the text, and where the first sample shows states; what leaves
+/// less is taken.
+///
+/// # Errors
+/// As [`estimate`](super::estimate()).
+pub fn start_by_least_squares(
+    plant: &Plant,
+    recording: &PlantRecording,
+    hold: Hold,
+) -> Result<Vec<Option<f64>>, EstimateError> {
+    let options = EstimateOptions {
+        free: vec![false; plant.nominal().parameters.len()],
+        hold,
+        form: Some(Form::FreeRun),
+        least_squares: true,
+    };
+    let recordings = std::slice::from_ref(recording);
+    let found = estimate(plant, recordings, &options)?;
+    let from_text = found.points.into_iter().next();
+    let from_text = from_text.map_or_else(|| plant.nominal().start, |point| point.start);
+    let problem = Problem::new(plant, recordings, &options)?;
+    let mut point = problem.nominal();
+    start_where_measured(&problem, plant, &mut point);
+    let mut measured = || {
+        search(&problem, Form::FreeRun, &mut point, &problem.ranges())?;
+        let deviance = white_fit(&problem, &mut point, ROUND)?;
+        let start = problem.points(&point).into_iter().next()?.start;
+        (deviance < found.deviance).then_some(start)
+    };
+    Ok(measured().unwrap_or(from_text))
+}
+
+/// An output is linear in a state if a step misses it by less than this part.
+const LINEAR: f64 = 1e-6;
+
+/// Initial states that an output shows alone begin where the first sample shows them: an angle may be many turns from that of the
+/// text, and a search from there stops at the first turn that looks alike.
+fn start_where_measured(problem: &Problem, plant: &Plant, point: &mut [f64]) {
+    let (first, count) = (problem.free.len(), problem.starts.len());
+    for (r, (at, recording)) in (problem.points(point).iter().zip(problem.recordings)).enumerate() {
+        let mut state = plant.start(at);
+        let inputs: Vec<f64> = recording.inputs.iter().map(|u| u[0]).collect();
+        let mut lineariser = plant.lineariser(at);
+        let mut linear = |state: &[f64]| lineariser.at(state, &inputs, recording.start_time);
+        for (o, y) in recording.outputs.iter().enumerate() {
+            let now = linear(&state);
+            let missed = y[0] - now.output[o];
+            let shown: Vec<usize> = (0..state.len()).filter(|&i| now.c[(o, i)] != 0.0).collect();
+            let &[i] = &shown[..] else {
+                continue;
+            };
+            let Some(k) = problem.starts.iter().position(|&s| s == i) else {
+                continue;
+            };
+            let mut moved = state.clone();
+            moved[i] += missed / now.c[(o, i)];
+            if (linear(&moved).output[o] - y[0]).abs() <= LINEAR * missed.abs() {
+                point[first + r * count + k] = moved[i];
+                state = moved;
+            }
+        }
+    }
 }
 
 /// Initial states by least squares, on the first samples of each recording and then on twice as many until there are no more:

@@ -19,7 +19,7 @@ mod study;
 
 pub use adequacy::{Question, ResidualTest};
 pub use determined::Undetermined;
-pub use evaluate::{Evaluation, Held, HeldNoise, evaluate};
+pub use evaluate::{Evaluation, Held, HeldNoise, evaluate, start_by_least_squares};
 pub use problem::{EstimateError, PlantRecording};
 pub(crate) use study::Study;
 

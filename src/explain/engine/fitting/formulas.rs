@@ -13,7 +13,7 @@ use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::TERMS;
 use crate::explain::engine::terms::term::{Needs, Port, Starts, Term, curve, shape};
 use crate::explain::engine::terms::values::{Instance, evaluate, grid};
-use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
+use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::{Fit, Study};
 
 const WIDTHS: Starts = Starts::Spread(&[0.1, 0.2, 0.5, 1.0, 2.0]);
@@ -39,8 +39,11 @@ const FORMULAS: &[Term] = &[
         &[shape("o", MIDDLES, false), shape("s", WIDTHS, true)],
     ),
 ];
-/// Formulas that are fitted to the recording: those nearest to the curve.
+/// Formulas that are fitted to the recording: those nearest to the curve, and of the terms of the library those nearest to it.
 const FITTED: usize = 3;
+const LISTED: usize = 2;
+/// Steps in which the straight part of a curve passes into the parameters.
+const PASSES: usize = 5;
 
 const fn law(
     form: &'static str,
@@ -54,6 +57,8 @@ struct Near {
     term: &'static Term,
     shapes: Vec<f64>,
     strength: f64,
+    /// Slope of the curve's straight part beside it.
+    slope: f64,
     /// What it leaves of the curve's sum of squares about its straight part.
     left: f64,
 }
@@ -68,6 +73,8 @@ pub(in crate::explain::engine) fn formulas(
     nearest
         .par_iter()
         .filter_map(|near| {
+            let level = levelled(best, near.slope, ground);
+            let best = level.as_ref().unwrap_or(best);
             let start = (&near.shapes[..], near.strength);
             let refit = |study: &Study, from: &Fit| study.refit(from, ROUNDS, THOROUGH);
             in_its_place(best, near.term, start, &refit, arguments, ground)
@@ -75,18 +82,53 @@ pub(in crate::explain::engine) fn formulas(
         .collect()
 }
 
+/// The curve of a fit, as its knots have it.
+fn fitted_curve(best: &Fitted, ground: &Ground) -> Option<Curve> {
+    let knots = best.lead.curve.as_ref()?.knots.clone();
+    let first = ground.study.parameters();
+    let values = best.fit.point[first..first + knots.len()].to_vec();
+    Some(Curve { knots, values })
+}
+
+/// The fit with a curve that rises less by `slope`, where parameters can do that instead: a formula that leaves it to them starts from
+/// there without a jump. Step by step, because what is straight may move a resonance far.
+fn levelled(best: &Fitted, slope: f64, ground: &Ground) -> Option<Fitted> {
+    let curve = fitted_curve(best, ground)?;
+    let options = with_more(ground.options, best.candidate.values.len());
+    let rough = best.candidate.rough(MOST_STEPS);
+    let inner = ground.study.of(&rough, &options).ok()?;
+    let first = ground.study.parameters();
+    let held: Vec<usize> = (first..first + curve.knots.len()).collect();
+    let mut fit = best.fit.clone();
+    for pass in 1..=PASSES {
+        let part = slope * pass as f64 / PASSES as f64;
+        for (i, (knot, value)) in curve.knots.iter().zip(&curve.values).enumerate() {
+            fit.point[first + i] = value - part * knot;
+        }
+        fit = inner.holding(&fit, &held, GLANCE)?;
+    }
+    // What no parameter does stays in the curve.
+    let allowed = inner.cost_of_a_number() * curve.knots.len() as f64;
+    let rises = inner.information() * (fit.deviance - best.fit.deviance);
+    (rises < allowed).then(|| Fitted {
+        fit,
+        ..best.clone()
+    })
+}
+
 /// The regression of the curve on each formula, beside a constant and a slope: those may be what parameters do.
 fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec<Near>> {
-    let curve = best.lead.curve.as_ref()?;
+    let curve = fitted_curve(best, ground)?;
     let at = best.lead.argument?;
     let argument = &arguments[at];
-    let first = ground.study.parameters();
-    let curve = Curve {
-        knots: curve.knots.clone(),
-        values: best.fit.point[first..first + curve.knots.len()].to_vec(),
-    };
+    let in_equation = matches!(best.lead.place, Place::Equation(_));
+    let listed = TERMS.iter().filter(|term| {
+        let is_function = term.memories.is_empty() && term.free_strength;
+        in_equation && is_function && term.port == Port::Equation && term.needs == Needs::Anything
+    });
     let instances: Vec<Instance> = FORMULAS
         .iter()
+        .chain(listed)
         .flat_map(|term| {
             let mut all = grid(term, Some(argument), ground.recordings, &[]);
             // What rises and falls, or steps, may do so at any knot: between quantiles it would be missed.
@@ -129,6 +171,7 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
             term: instance.term,
             shapes: instance.shapes,
             strength: regression[2],
+            slope: regression[1],
             left,
         };
         match found.iter_mut().find(|n| n.term == near.term) {
@@ -138,17 +181,25 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
         }
     }
     found.sort_by(|a, b| a.left.total_cmp(&b.left));
-    found.truncate(FITTED);
+    let mut kept = [0; 2];
+    found.retain(|near| {
+        let is_formula = near.term.id == "formula";
+        let (count, most) = match is_formula {
+            true => (&mut kept[0], FITTED),
+            false => (&mut kept[1], LISTED),
+        };
+        *count += 1;
+        *count <= most
+    });
     // A straight line is no curve; from far away its own fit may have ended elsewhere.
-    if let Place::Equation(_) = best.lead.place
-        && let Some(term) = TERMS.iter().find(|term| term.id == "linear")
-    {
+    if in_equation && let Some(term) = TERMS.iter().find(|term| term.id == "linear") {
         let basis = DMatrix::from_fn(z.len(), 2, |i, j| [1.0, z[i]][j]);
         let line = (basis.tr_mul(&basis).cholesky()).map(|n| n.solve(&basis.tr_mul(&wanted)));
         found.extend(line.map(|line| Near {
             term,
             shapes: vec![],
             strength: line[1],
+            slope: 0.0,
             left: 0.0,
         }));
     }

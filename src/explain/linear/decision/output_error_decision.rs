@@ -398,36 +398,39 @@ fn output_error_refit(problem: &Problem) -> Option<Structure> {
     })
 }
 
-/// Effects that are tried in one recording only: those that explain most of all of them.
+/// Effects that are fitted to the end in one recording only: those that promise most after a first step.
 const IN_ONE: usize = 6;
 
-/// The best effects, best first in `ranked`, in one recording only, where that explains all of them better: what acts in one
-/// explains little of all, and another effect may come before it there.
+/// Effects in one recording only, where that explains all of them better: what acts in one explains little of all, and another
+/// effect may come before it there.
 fn in_one_recording_each(problem: &Problem, ranked: &[Ranked], base: f64) -> Vec<Ranked> {
-    if problem.data.segments.len() < 2 {
+    let recordings = problem.data.segments.len();
+    if recordings < 2 {
         return Vec::new();
     }
     let mut best: Vec<&Ranked> = Vec::new();
     let definition = |r: &Ranked| r.fit.structure.new_effects()[0].definition.id;
     for r in ranked {
-        let single = r.fit.structure.new_effects().len() == 1;
-        // What changes at a time that is not that of the other recordings explains nothing of all.
-        let wanted = best.len() < IN_ONE
-            || r.fit
-                .structure
-                .change_time(r.fit.structure.first_new())
-                .is_some();
-        if wanted && single && best.iter().all(|b| definition(b) != definition(r)) {
+        let single = r.fit.structure.new_effects().len() == 1 && !r.fit.structure.is_tanks();
+        if single && best.iter().all(|b| definition(b) != definition(r)) {
             best.push(r);
         }
     }
     let count = problem.count();
-    let of_one = |r: &Ranked| {
-        let mut one = Ranked::new(problem, in_one_recording(problem, &r.fit)?);
+    let mut glanced: Vec<(&Ranked, Fit)> = (best.into_par_iter())
+        .flat_map_iter(|r| (0..recordings).map(move |recording| (r, recording)))
+        .filter_map(|(r, recording)| Some((r, glanced_in_one(problem, &r.fit, recording)?)))
+        .collect();
+    glanced.sort_by(|a, b| a.1.criterion(count).total_cmp(&b.1.criterion(count)));
+    glanced.truncate(IN_ONE);
+    let of_one = |(all, glanced): (&Ranked, Fit)| {
+        let fit = fit_lead(problem, glanced.structure, glanced.theta, Effort::FINAL)?;
+        let better = fit.criterion(count) + chosen_among(problem) < all.fit.criterion(count);
+        let mut one = Ranked::new(problem, fit);
         one.criterion += penalty(&one, base, count) + chosen_among(problem);
-        sane(problem, &one.fit).then_some(one)
+        (better && sane(problem, &one.fit)).then_some(one)
     };
-    best.into_par_iter().filter_map(of_one).collect()
+    glanced.into_par_iter().filter_map(of_one).collect()
 }
 
 /// What the choice of a recording owes.
@@ -435,31 +438,18 @@ fn chosen_among(problem: &Problem) -> f64 {
     2.0 * (problem.data.segments.len() as f64).ln()
 }
 
-/// The effect of `fit` in one recording only, where that explains all of them significantly better: the others say that it
-/// is not there.
-fn in_one_recording(problem: &Problem, fit: &Fit) -> Option<Fit> {
-    let recordings = problem.data.segments.len();
-    if recordings < 2 || fit.structure.is_tanks() {
-        return None;
-    }
-    let count = problem.count();
-    let owed = chosen_among(problem);
-    (0..recordings)
-        .filter_map(|recording| {
-            let structure = Structure {
-                recording: Some(recording),
-                ..fit.structure.clone()
-            };
-            let starts = starts_of_change(problem, &structure, &fit.theta, recording);
-            let glanced = starts.into_iter().filter_map(|start| {
-                let noise = Some(&fit.noise);
-                Fit::run(problem, structure.clone(), start, noise, Effort::GLANCE)
-            });
-            let best = glanced.min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
-            fit_lead(problem, best.structure, best.theta, Effort::FINAL)
-        })
-        .min_by(|a, b| a.criterion(count).total_cmp(&b.criterion(count)))
-        .filter(|one| one.criterion(count) + owed < fit.criterion(count))
+/// The effect of `fit` in one recording only, after a first step.
+fn glanced_in_one(problem: &Problem, fit: &Fit, recording: usize) -> Option<Fit> {
+    let structure = Structure {
+        recording: Some(recording),
+        ..fit.structure.clone()
+    };
+    let starts = starts_of_change(problem, &structure, &fit.theta, recording);
+    let glanced = starts.into_iter().filter_map(|start| {
+        let noise = Some(&fit.noise);
+        Fit::run(problem, structure.clone(), start, noise, Effort::GLANCE)
+    });
+    glanced.min_by(|a, b| a.deviance.total_cmp(&b.deviance))
 }
 
 /// Times that are tried for a change in one recording.

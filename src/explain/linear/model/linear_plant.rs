@@ -18,19 +18,20 @@ pub(crate) struct Plant {
 }
 
 impl Plant {
-    /// Whether a pole has a damping ratio below 0.995: an identified double pole may be a pair that turns a little. A negative
-    /// real pole of a sampled plant does not count.
+    /// Whether the slowest pole has a damping ratio below 0.995: a spring holds the whole of it. An identified double pole may be a
+    /// pair that turns a little. A drive with an elastic shaft oscillates too, but its slowest pole is that of all masses against
+    /// friction. A negative real pole of a sampled plant does not count.
     pub(crate) fn oscillates(&self) -> bool {
         const TURNS: f64 = 0.1;
         if self.states == 0 {
             return false;
         }
         let poles = self.a_matrix().complex_eigenvalues();
-        let mut pairs = poles
-            .iter()
-            .filter(|pole| pole.im != 0.0)
+        let continuous = (poles.iter())
+            .filter(|pole| pole.im != 0.0 || pole.re > 0.0)
             .map(|pole| pole.ln());
-        pairs.any(|pole| pole.im.abs() > TURNS * pole.re.abs())
+        let slowest = continuous.min_by(|a, b| a.norm().total_cmp(&b.norm()));
+        slowest.is_some_and(|pole| pole.im.abs() > TURNS * pole.re.abs())
     }
 
     pub(crate) fn from_state_space(system: &StateSpace) -> Self {

@@ -329,13 +329,12 @@ impl Bench<'_> {
             return Vec::new();
         };
         let rows = &self.rows;
-        let aperiodic = crate::linalg::eigenvalues(&self.plant.a_matrix())
-            .is_ok_and(|poles| poles.iter().all(|p| p.im == 0.0));
+        let oscillates = self.plant.oscillates();
         let mut templates = Vec::new();
         for signal in signals {
-            // One output of a plant that cannot oscillate (a drive) may be a speed as well as a position, so friction
-            // is tried on both.
-            let drive = || aperiodic && definition.id != "quadratic_drag";
+            // One output of a plant that no spring holds (a drive) may be a speed as well as a position, so friction is tried on
+            // both.
+            let drive = || !oscillates && definition.id != "quadratic_drag";
             let possible = match (needs, signal.instance_signal) {
                 (Needs::Time, place) => place == Signal::Output(0),
                 (Needs::Rate, place @ Signal::Integral(_)) => {
