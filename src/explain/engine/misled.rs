@@ -70,6 +70,6 @@ pub(super) fn reacting_inputs(
     let innovations = fit.noise.whiten(&residual, study.mask());
     let inputs: Vec<&[Vec<f64>]> = recordings.iter().map(|r| &r.inputs[..]).collect();
     // What the input is between samples acts on the output that ends them, unless it is held.
-    let first = usize::from(hold != Hold::Zero);
-    inputs_foretold(&innovations, study.mask(), &inputs, first)
+    let simulated = (hold == Hold::Zero).then(|| study.free_run(fit)).flatten();
+    inputs_foretold(&innovations, study.mask(), &inputs, simulated.as_ref())
 }

@@ -55,10 +55,12 @@ const MOST: f64 = 0.99;
 /// Probability below which a name is not given: two of three such names are wrong.
 const UNLIKELY: f64 = 1.0 / 3.0;
 
-/// Whether a name is more than twice as likely wrong as right.
+/// Whether a name is more than twice as likely wrong as right. The regression holds no drives by their averaged equation, and no plants
+/// of another class.
 pub(crate) fn is_unlikely(finding: &Finding) -> bool {
     let stated = || 1.0 / (1.0 + (-named(finding)).exp());
-    finding.verdict == Verdict::Named && finding.weak.is_none() && stated() < UNLIKELY
+    let known = finding.weak.is_none() && !finding.model.structure.is_tanks();
+    finding.verdict == Verdict::Named && known && stated() < UNLIKELY
 }
 
 /// Probability that the answer is right; `fit` is the table that is shown beside it.

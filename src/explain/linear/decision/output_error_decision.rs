@@ -196,7 +196,11 @@ pub(crate) fn inquire(
         return Some((finding, problem.mask));
     }
     let mut ranked = single_effects(&problem, &finding.boring, allowed);
-    if finding.boring.improve_from(&problem, &ranked) {
+    let promising: Vec<&Fit> = (ranked.iter())
+        .filter(|r| base - r.criterion > NEEDED && !r.fit.structure.is_tanks())
+        .map(|r| &r.fit)
+        .collect();
+    if finding.boring.improve_from(&problem, &promising) {
         base = least(&finding.boring);
         finding.model = finding.boring.best(count).clone();
     }

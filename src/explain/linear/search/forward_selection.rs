@@ -157,7 +157,7 @@ fn feedback(problem: &Problem, fit: &Fit) -> bool {
     let innovations = fit.noise.whiten(&fit.residual, &problem.mask);
     let signals = data.signals();
     let inputs: Vec<&[Vec<f64>]> = data.segments.iter().map(|s| &s.inputs[..signals]).collect();
-    !inputs_foretold(&innovations, &problem.mask, &inputs, 1).is_empty()
+    !inputs_foretold(&innovations, &problem.mask, &inputs, None).is_empty()
 }
 
 /// Decrease of the deviance from `a` to `b` on blocks that neither is fitted to, over their share of all that is fitted:

@@ -7,8 +7,6 @@ use crate::explain::effects;
 use crate::explain::linear::fit::{Effort, Fit, Problem};
 use crate::explain::linear::model::functionals::{Functionals, Signal};
 use crate::explain::linear::model::structure::{Direction, Instance, Structure};
-use crate::explain::linear::search::penalties::NEEDED;
-use crate::explain::linear::search::single_effects::Ranked;
 
 /// Probability by chance below which other parameters are certain. Slow noise makes a likelihood ratio larger than its law says.
 const REFUSED: f64 = 1e-6;
@@ -89,15 +87,11 @@ impl Boring {
 
     /// Takes over what fits with an effect show of the other numbers: without the effect they may be a better null model than was
     /// found, and what was gained by them is no evidence of the effect. Whether anything was better.
-    pub(crate) fn improve_from(&mut self, problem: &Problem, candidates: &[Ranked]) -> bool {
+    pub(crate) fn improve_from(&mut self, problem: &Problem, promising: &[&Fit]) -> bool {
         let count = problem.count();
         let least = self.best(count).criterion(count);
-        let promising: Vec<&Ranked> = (candidates.iter())
-            .filter(|r| least - r.criterion > NEEDED && !r.fit.structure.is_tanks())
-            .collect();
-        let better: Vec<Fit> = promising
-            .into_par_iter()
-            .filter_map(|r| without_effects(problem, &r.fit))
+        let better: Vec<Fit> = (promising.par_iter())
+            .filter_map(|fit| without_effects(problem, fit))
             .filter(|fit| fit.criterion(count) < least)
             .filter_map(|fit| fit.improved(problem, Effort::FINAL))
             .collect();
