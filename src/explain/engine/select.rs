@@ -96,9 +96,10 @@ fn decide(
     };
     let study = Study::new(&likely.plant, recordings, &likely.options)?;
     let follows = 1.0 - without.whole.powi(2) > SATISFACTORY;
+    let driven = !plant.spec.inputs().is_empty();
     likely.reacting = reacting_inputs(&study, &likely.fit, recordings, hold);
     likely.misled = !likely.reacting.is_empty()
-        || !follows && integrates(&likely.plant, &study, &likely.fit, recordings);
+        || driven && !follows && integrates(&likely.plant, &study, &likely.fit, recordings);
     let whole = best(&rivals, |r| r.accepted == likely.accepted);
     let holds = whole.is_some_and(|w| w.held_out.over(&without.held_out) <= 1.0 + EQUAL)
         && !worsens(&rivals, 0, likely.accepted);
