@@ -174,7 +174,7 @@ mod tests {
         };
         let e: Vec<f64> = (0..2000).map(|_| uniform()).collect();
         let mut level = 0.0;
-        let u = (0..2000).map(|k| {
+        let u = (0..2000usize).map(|k| {
             if k % 25 == 0 {
                 level = uniform();
             }
