@@ -4,7 +4,8 @@ use innovant::internal::report::{Style, plant_estimate_text, plant_text, plant_v
 use innovant::internal::report::{frequency_grid, plant_fits, text_alone};
 use innovant::log::Channel;
 use innovant::physics::estimate::{
-    EstimateOptions, Form, Held, PlantRecording, estimate, evaluate,
+    EstimateError, EstimateOptions, Form, Held, PlantRecording, estimate, evaluate,
+    start_by_least_squares,
 };
 use innovant::physics::{
     Excitation, Hold, OperatingPoint, Plant as Core, Point, VariableId, diagnose, render_all,
@@ -250,18 +251,18 @@ impl Plant {
         dt: f64,
         hold: Option<&str>,
     ) -> PyResult<Vec<(String, f64)>> {
-        let options = EstimateOptions {
-            free: vec![false; self.point.parameters.len()],
-            hold: self.hold(hold)?,
-            form: Some(Form::FreeRun),
-            least_squares: true,
-        };
+        let hold = self.hold(hold)?;
         let logs = sparse_recordings(&[u], &[y], dt, &self.inputs(), &self.outputs())?;
         let plant = self.core.with_values(&self.point.parameters);
+        let recording = (logs.first()).map(PlantRecording::from);
+        let recording = recording.ok_or_else(|| raise(EstimateError::Empty))?;
         let start = py.detach(|| {
-            let records: Vec<PlantRecording> = logs.iter().map(PlantRecording::from).collect();
-            let found = estimate(&plant, &records, &options).map_err(raise)?;
-            Ok::<_, PyErr>(plant.start(&found.points[0]))
+            let start = start_by_least_squares(&plant, &recording, hold).map_err(raise)?;
+            let at = Point {
+                parameters: self.point.parameters.clone(),
+                start,
+            };
+            Ok::<_, PyErr>(plant.start(&at))
         })?;
         Ok(self.states().into_iter().zip(start).collect())
     }

@@ -98,6 +98,26 @@ fn equations_that_do_not_follow_are_not_consistent() {
     assert!(poor >= 2, "{poor} of 4");
 }
 
+/// A dose that is swallowed rises before it falls; an injected one only falls, and a constant follows a few samples as well.
+#[test]
+fn equations_that_a_constant_beats_explain_nothing() {
+    let folder = Folder::new();
+    folder.text("plant.mo", BOLUS);
+    let mut normal = noise(5);
+    let mut text = String::from("time [h],y\n");
+    for t in [0.0_f64, 0.25, 0.5, 1.0, 2.0, 4.0, 5.0, 7.0, 9.0, 12.0, 24.0] {
+        let level = 11.0 * ((-0.08 * t).exp() - (-0.8 * t).exp());
+        writeln!(text, "{t},{:.2}", (level + 0.3 * normal()).max(0.0)).unwrap();
+    }
+    folder.text("log.csv", &text);
+    let said = folder.explained("log.csv", "plant.mo", &["--only", "coulomb_friction"]);
+    let fit = &said["fit"]["train"]["parameters_only"]["fit_percent"];
+    assert!(fit.as_f64().unwrap() < 0.0, "{}", said["fit"]);
+    assert_eq!(said["verdict"], "unexplained", "{}", said["summary"]);
+    let words = said["summary"].to_string();
+    assert!(words.contains("A constant follows y better"), "{words}");
+}
+
 #[test]
 fn a_capacitor_that_discharges_itself_leaks() {
     let folder = Folder::new();

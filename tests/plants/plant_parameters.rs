@@ -8,6 +8,14 @@ use crate::plant_initial_states::noise;
 /// Steps of a simulation in a sample.
 const STEPS: usize = 20;
 
+/// A force that is another one after so many samples.
+fn steps(samples: usize, every: usize, mut normal: impl FnMut() -> f64) -> Vec<f64> {
+    let levels: Vec<f64> = (0..samples.div_ceil(every))
+        .map(|_| 10.0 * normal())
+        .collect();
+    (0..samples).map(|k| levels[k / every]).collect()
+}
+
 /// Two masses with a spring between them and one to the ground, pushed at the first: positions of the second at every sample.
 fn two_masses(force: &[f64], step: f64, between: f64) -> Vec<f64> {
     let (mut x, mut v) = ([0.0; 2], [0.0; 2]);
@@ -75,22 +83,15 @@ fn explained(input: &[f64], recorded: &[f64], simulated: &[f64], step: f64) -> s
     folder.explained("log.csv", "simulation.csv", &[])
 }
 
-/// One of several springs is softer or stiffer: all modes move, and no change at some time, mass or drag stands for it.
+/// One of several springs is stiffer by 2 %: all modes move, and no change at some time, mass or drag stands for it. In two of eight
+/// draws one did, where the null models held no mass and did not start again.
 #[test]
 fn another_spring_is_no_missing_physics() {
-    for (seed, factor) in [(1, 1.03), (2, 0.97), (3, 1.015)] {
+    for seed in 1..=8 {
         let mut normal = noise(seed);
-        let mut f = 0.0;
-        let force: Vec<f64> = (0..1600)
-            .map(|k| {
-                if k % 25 == 0 {
-                    f = 10.0 * normal();
-                }
-                f
-            })
-            .collect();
+        let force = steps(1600, 25, &mut normal);
         let simulated = two_masses(&force, 0.01, 300.0);
-        let mut recorded = two_masses(&force, 0.01, 300.0 * factor);
+        let mut recorded = two_masses(&force, 0.01, 1.02 * 300.0);
         recorded.iter_mut().for_each(|y| *y += 0.0015 * normal());
         let said = explained(&force, &recorded, &simulated, 0.01);
         assert_eq!(said["verdict"], "parameters", "{seed}: {}", said["summary"]);
@@ -121,15 +122,7 @@ fn another_resonance_of_an_axis_is_found() {
 #[test]
 fn the_mass_that_was_added_is_stated() {
     let mut normal = noise(4);
-    let mut f = 0.0;
-    let force: Vec<f64> = (0..2000)
-        .map(|k| {
-            if k % 30 == 0 {
-                f = 10.0 * normal();
-            }
-            f
-        })
-        .collect();
+    let force = steps(2000, 30, &mut normal);
     let positions = |added: f64| -> Vec<f64> {
         let (mut x, mut v) = (0.0, 0.0);
         let h = 0.02 / STEPS as f64;

@@ -18,7 +18,7 @@ pub use simulate_explained::{AugmentedPlantError, Original};
 
 use nalgebra::DMatrix;
 
-use self::judgement::free_run::is_astray;
+use self::judgement::free_run::astray;
 use self::judgement::joint_test::joint_test;
 use self::judgement::stated_probability::probability;
 use self::nearest_to_text::nearest_to_text;
@@ -224,10 +224,11 @@ impl Answer<'_> {
         let percent = |o: &OutputFit| o.train.augmented.fit_percent;
         each.sort_by(|a, b| percent(a).total_cmp(&percent(b)));
         let strays = self.strays(&each);
+        let asked = effects.is_empty() && !self.found.misled;
         let baseline = (&self.base, &self.found.baseline);
-        let astray = effects.is_empty()
-            && !self.found.misled
-            && is_astray(&each, strays, self.plant, baseline, self.recordings);
+        let astray = asked
+            .then(|| astray(&each, strays, self.plant, baseline, self.recordings))
+            .flatten();
         let (differs, together) = match effects.is_empty() && parameters.is_empty() {
             true => self.differs(),
             false => (Differs::Parameters, None),
@@ -239,7 +240,11 @@ impl Answer<'_> {
             .max_by(|a, b| a.criterion_gain.total_cmp(&b.criterion_gain));
         let verdict = if self.found.accepted > 0 && sure {
             Verdict::Named
-        } else if self.found.accepted > 0 || p_value < CHANCE || astray || refused.is_some() {
+        } else if self.found.accepted > 0
+            || p_value < CHANCE
+            || astray.is_some()
+            || refused.is_some()
+        {
             Verdict::Unexplained
         } else if matches!(differs, Differs::Parameters | Differs::Together(_)) {
             Verdict::Parameters

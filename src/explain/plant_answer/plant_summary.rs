@@ -1,7 +1,7 @@
 //! The answer in sentences.
 
 use super::Answer;
-use super::judgement::free_run::STRAYS;
+use super::judgement::free_run::{Astray, STRAYS, leaves_half};
 use super::where_to_look::places;
 use super::within_bounds::at_bounds;
 use crate::explain::document::sentences::{number, p_value, quantity};
@@ -42,8 +42,8 @@ pub(super) struct Told<'a> {
     pub(super) p_value: f64,
     /// Error of the free run over that of one-step predictions.
     pub(super) strays: f64,
-    /// Without an effect, the free run is too poor for nothing to be missing.
-    pub(super) astray: bool,
+    /// Without an effect, why the free run is too poor for nothing to be missing.
+    pub(super) astray: Option<Astray>,
     /// What the criterion is sure of, but blocks left out refuse.
     pub(super) refused: Option<&'a Alternative>,
 }
@@ -80,18 +80,19 @@ impl Answer<'_> {
                 lines.push(
                     "Something is missing in the equations, and no term of the library describes it surely.".to_owned(),
                 );
-                if told.astray {
-                    lines.push(match told.strays > STRAYS {
-                        true => format!(
-                            "The free run leaves {:.1} times the error of one-step predictions, and more than half of the variance: \
-                             no noise of a sensor is so slow.",
-                            told.strays
-                        ),
-                        false => "The free run leaves more than half of the variance, and its error changes slowly: no noise of a \
-                                  sensor is so slow."
-                            .to_owned(),
-                    });
-                }
+                lines.extend(told.astray.as_ref().map(|astray| match astray {
+                    Astray::WorseThanConstant(output) => format!(
+                        "A constant follows {output} better than the free run of the equations does."
+                    ),
+                    Astray::Slow if told.strays > STRAYS => format!(
+                        "The free run leaves {:.1} times the error of one-step predictions, and more than half of the variance: \
+                         no noise of a sensor is so slow.",
+                        told.strays
+                    ),
+                    Astray::Slow => "The free run leaves more than half of the variance, and its error changes slowly: no noise of a \
+                                     sensor is so slow."
+                        .to_owned(),
+                }));
                 lines.extend(told.refused.map(|a| {
                     format!(
                         "The effect `{}` improves the fit (gain {:.1}, needed {NEEDED:.1}), but not simulations of held-out blocks: {}.",
@@ -154,6 +155,12 @@ fn nothing_missing(told: &Told, at_bound: bool) -> Vec<String> {
         format!(
             "With {with}, {no_effect}, but the residual is not white ({}).",
             p_value(told.p_value)
+        )
+    } else if let Some(poor) = told.outputs.iter().find(|o| leaves_half(o)) {
+        format!(
+            "The recording does not refute the equations with {with}, but their free run explains less than half of the variance of \
+             {}: it says little of what may be missing.",
+            poor.output
         )
     } else if at_bound && !as_well(told) {
         format!("The equations follow the recording with {with} within their bounds; {no_effect}.")
@@ -410,7 +417,7 @@ pub(super) mod tests {
         outputs: &[],
         p_value: 0.3,
         strays: 1.1,
-        astray: false,
+        astray: None,
         refused: None,
     };
 
@@ -455,7 +462,7 @@ pub(super) mod tests {
         let told = Told {
             p_value: 0.0027,
             strays: 6.3,
-            astray: false,
+            astray: None,
             refused: None,
             ..NOTHING
         };
@@ -469,7 +476,7 @@ pub(super) mod tests {
         assert!(said[1].contains("cannot be told apart"), "{said:?}");
         let told = Told {
             strays: 6.3,
-            astray: false,
+            astray: None,
             refused: None,
             ..NOTHING
         };

@@ -506,11 +506,7 @@ fn detectable(
         if r.fit.structure.is_tanks() || list.iter().any(|l| l.0.id == instance.definition.id) {
             continue;
         }
-        // The same numbers without the effect.
-        let mut without = r.fit.structure.clone();
-        let at = without.first_new();
-        let theta = r.fit.theta[..without.effect_offset(at)].to_vec();
-        without.effects.truncate(at);
+        let (without, theta) = r.fit.structure.without_new_effects(&r.fit.theta);
         let Some(simulated) = without.simulate(&theta, problem.data) else {
             continue;
         };

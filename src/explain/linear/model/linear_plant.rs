@@ -85,42 +85,34 @@ impl Plant {
     pub(crate) fn add_linear_force(&mut self, direction: &[f64], row: &[f64], feedthrough: &[f64]) {
         let (n, r) = (self.states, self.inputs);
         // Half of `row (x + A x + B u)`.
-        let after = |matrix: &[f64], columns: usize, column: usize| -> f64 {
-            (0..n).map(|i| row[i] * matrix[i * columns + column]).sum()
-        };
         let on_state: Vec<f64> = (0..n)
-            .map(|j| 0.5 * (row[j] + after(&self.a, n, j)))
+            .map(|j| 0.5 * (row[j] + product(row, &self.a, n, j)))
             .collect();
         let on_input: Vec<f64> = (0..r)
-            .map(|j| 0.5 * after(&self.b, r, j) + feedthrough.get(j).unwrap_or(&0.0))
+            .map(|j| 0.5 * product(row, &self.b, r, j) + feedthrough.get(j).unwrap_or(&0.0))
             .collect();
-        for (i, d) in direction.iter().enumerate() {
-            for (a, row) in self.a[i * n..(i + 1) * n].iter_mut().zip(&on_state) {
-                *a -= d * row;
-            }
-            for (b, row) in self.b[i * r..(i + 1) * r].iter_mut().zip(&on_input) {
-                *b -= d * row;
-            }
-        }
+        self.take_up(direction, &on_state, &on_input);
     }
 
     /// Takes up a force through `direction` that is minus the change of `row x` over a sample interval, per second: what a mass needs
     /// to be accelerated.
     pub(crate) fn add_inertia(&mut self, direction: &[f64], row: &[f64]) {
-        let (n, r) = (self.states, self.inputs);
-        let after = |matrix: &[f64], columns: usize, column: usize| -> f64 {
-            (0..n).map(|i| row[i] * matrix[i * columns + column]).sum()
-        };
-        let h = self.sample_time;
+        let (n, r, h) = (self.states, self.inputs, self.sample_time);
         let on_state: Vec<f64> = (0..n)
-            .map(|j| (after(&self.a, n, j) - row[j]) / h)
+            .map(|j| (product(row, &self.a, n, j) - row[j]) / h)
             .collect();
-        let on_input: Vec<f64> = (0..r).map(|j| after(&self.b, r, j) / h).collect();
+        let on_input: Vec<f64> = (0..r).map(|j| product(row, &self.b, r, j) / h).collect();
+        self.take_up(direction, &on_state, &on_input);
+    }
+
+    /// A force through `direction` of minus so much for each state and input.
+    fn take_up(&mut self, direction: &[f64], on_state: &[f64], on_input: &[f64]) {
+        let (n, r) = (self.states, self.inputs);
         for (i, d) in direction.iter().enumerate() {
-            for (a, row) in self.a[i * n..(i + 1) * n].iter_mut().zip(&on_state) {
+            for (a, row) in self.a[i * n..(i + 1) * n].iter_mut().zip(on_state) {
                 *a -= d * row;
             }
-            for (b, row) in self.b[i * r..(i + 1) * r].iter_mut().zip(&on_input) {
+            for (b, row) in self.b[i * r..(i + 1) * r].iter_mut().zip(on_input) {
                 *b -= d * row;
             }
         }
@@ -139,4 +131,9 @@ impl Plant {
 
 pub(crate) fn row_major(matrix: &DMatrix<f64>) -> Vec<f64> {
     matrix.transpose().as_slice().to_vec()
+}
+/// A row times a column of a matrix by rows.
+fn product(row: &[f64], matrix: &[f64], columns: usize, column: usize) -> f64 {
+    let of_column = matrix.iter().skip(column).step_by(columns);
+    row.iter().zip(of_column).map(|(a, b)| a * b).sum()
 }

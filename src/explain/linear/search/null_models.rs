@@ -91,7 +91,10 @@ impl Boring {
         let count = problem.count();
         let least = self.best(count).criterion(count);
         let better: Vec<Fit> = (promising.par_iter())
-            .filter_map(|fit| without_effects(problem, fit))
+            .filter_map(|fit| {
+                let (structure, theta) = fit.structure.without_new_effects(&fit.theta);
+                Fit::at(problem, structure, theta)
+            })
             .filter(|fit| fit.criterion(count) < least)
             .filter_map(|fit| fit.improved(problem, Effort::FINAL))
             .collect();
@@ -120,15 +123,6 @@ impl Boring {
             &self.near
         }
     }
-}
-
-/// The other numbers of a fit, without its effects.
-fn without_effects(problem: &Problem, fit: &Fit) -> Option<Fit> {
-    let mut structure = fit.structure.clone();
-    let first = structure.first_new();
-    let theta = fit.theta[..structure.effect_offset(first)].to_vec();
-    structure.effects.truncate(first);
-    Fit::at(problem, structure, theta)
 }
 
 /// Other parameters about an operating point: where a plant with other gains is linear about a level, its outputs are

@@ -9,30 +9,51 @@ use crate::physics::estimate::{Fit, PlantRecording, Study};
 /// A free run that leaves more of an output than so many one-step errors strays: with this noise what is slow explains most of it.
 pub(in crate::explain::plant_answer) const STRAYS: f64 = 2.0;
 
-/// Whether the free run of an output leaves half of its variance, and far more than predictions of the next sample do or would: a
-/// noise model or an observer has taken over what the equations should do, or nothing has. Of an unstable plant that its inputs hold
-/// a free run says nothing.
-pub(in crate::explain::plant_answer) fn is_astray(
+/// What a number takes off the deviance of noise on average: the mean of chi-square with one degree of freedom.
+const ONE_NUMBER: f64 = 1.0;
+
+/// Why a free run without an effect is too poor for nothing to be missing.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::explain::plant_answer) enum Astray {
+    /// It leaves half of the variance of an output, and far more than predictions of the next sample do or would: a noise model or an
+    /// observer has taken over what the equations should do, or nothing has.
+    Slow,
+    /// A constant leaves less of this output, by more than its one number takes off noise.
+    WorseThanConstant(String),
+}
+
+/// What the free run without an effect leaves of the variance of an output.
+fn left(output: &OutputFit) -> f64 {
+    (1.0 - 0.01 * output.train.parameters_only.fit_percent).powi(2)
+}
+
+/// Whether that is half of it or more.
+pub(in crate::explain::plant_answer) fn leaves_half(output: &OutputFit) -> bool {
+    left(output) >= 1.0 - SATISFACTORY
+}
+
+/// Whether the free run is too poor. Of an unstable plant that its inputs hold a free run says nothing.
+pub(in crate::explain::plant_answer) fn astray(
     outputs: &[OutputFit],
     strays: f64,
     plant: &Plant,
     (study, fit): (&Study, &Fit),
     recordings: &[PlantRecording],
-) -> bool {
-    let unsatisfactory = |o: &OutputFit| {
-        let left = 1.0 - 0.01 * o.train.parameters_only.fit_percent;
-        left * left >= 1.0 - SATISFACTORY
+) -> Option<Astray> {
+    let share = study.effective_share(fit);
+    // The variance of one-step errors is about that part of what a slow error has.
+    let slow = strays > STRAYS || share.is_some_and(|share| share < STRAYS.powi(-2));
+    let independent = share.unwrap_or(1.0) * (study.count() / outputs.len().max(1)) as f64;
+    let beaten = |o: &&OutputFit| independent * left(o).ln() > ONE_NUMBER;
+    let found = match outputs.iter().find(beaten) {
+        Some(o) => Some(Astray::WorseThanConstant(o.output.clone())),
+        None => (slow && outputs.iter().any(leaves_half)).then_some(Astray::Slow),
     };
     let held = || {
         let inputs = !plant.spec.inputs().is_empty();
         inputs && is_unstable(plant, study, fit, recordings)
     };
-    // The variance of one-step errors is about that part of what a slow error has.
-    let slow = || {
-        let share = study.effective_share(fit);
-        share.is_some_and(|share| share < STRAYS.powi(-2))
-    };
-    outputs.iter().any(unsatisfactory) && (strays > STRAYS || slow()) && !held()
+    found.filter(|_| !held())
 }
 
 /// Whether a small difference grows more than e-fold over a recording, by the poles along it.

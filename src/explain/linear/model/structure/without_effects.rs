@@ -1,4 +1,4 @@
-//! A structure that is a plant alone.
+//! A structure that is a plant alone, and one without what was added to it.
 
 use std::sync::Arc;
 
@@ -29,5 +29,15 @@ pub(crate) fn bare(plant: &Plant, initial: &[Vec<f64>]) -> Structure {
         effects: Vec::new(),
         known: Vec::new(),
         adjusted: 0,
+    }
+}
+
+impl Structure {
+    /// The same structure and numbers without the effects that were looked for.
+    pub(crate) fn without_new_effects(&self, theta: &[f64]) -> (Self, Vec<f64>) {
+        let first = self.first_new();
+        let mut without = self.clone();
+        without.effects.truncate(first);
+        (without, theta[..self.effect_offset(first)].to_vec())
     }
 }
