@@ -156,7 +156,9 @@ fn of_plant(flags: &Flags, plant: &Path, say: Verbosity) -> anyhow::Result<Expla
             "--map is not available with a plant in equations: name the columns of the recording as the text does"
         );
     }
-    let loaded = load(plant)?;
+    let mut loaded = load(plant)?;
+    // The answer begins with what it says of units of time.
+    let clock = loaded.clock.take();
     tell_warnings(&loaded, say);
     let at_values = loaded.plant.with_values(&loaded.point.parameters);
     let (logs, recordings) = read_recordings(
@@ -176,7 +178,7 @@ fn of_plant(flags: &Flags, plant: &Path, say: Verbosity) -> anyhow::Result<Expla
         .map_err(|e| anyhow::anyhow!("{}: {e}", plant.display()))?;
     // What may make the whole answer wrong comes first.
     let units = units_of_logs(&at_values.spec, &channels(&at_values), &logs)?;
-    let doubts = loaded.clock.into_iter().chain(units);
+    let doubts = clock.into_iter().chain(units);
     let doubts: Vec<String> = doubts.map(|d| format!("Warning: {d}.")).collect();
     explanation.summary.splice(0..0, doubts);
     Ok(explanation)

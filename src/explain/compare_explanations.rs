@@ -8,11 +8,12 @@ const MOST: f64 = 0.5;
 /// Runs whose errors differ by less than this part are equally good (the tolerance of the project's score on real recordings).
 const EQUAL: f64 = 0.02;
 
-/// The part of the mean square of the error in blocks left out that the answer takes off.
+/// The part of the mean square of the error in blocks left out that the answer takes off what the simulation leaves, as it is given
+/// or with other parameters.
 fn removed(explanation: &Explanation) -> f64 {
     explanation.fit.heldout.as_ref().map_or(0.0, |steps| {
-        let (with, without) = (steps.augmented.rmse, steps.parameters_only.rmse);
-        1.0 - (with / without.max(f64::MIN_POSITIVE)).powi(2)
+        let without = steps.parameters_only.rmse.min(steps.simulation.rmse);
+        1.0 - (steps.augmented.rmse / without.max(f64::MIN_POSITIVE)).powi(2)
     })
 }
 
@@ -51,18 +52,20 @@ pub(crate) fn replaces(equations: &Explanation, other: &Explanation) -> bool {
     equations.verdict == Verdict::Named && more
 }
 
-/// Takes back what is not sure of a doubtful explanation.
+/// Takes back what is not sure of a doubtful explanation: where it leaves structure, what it says, and where it leaves none, but
+/// explains less than noise does, that anything is missing.
 pub(crate) fn doubt(explanation: &mut Explanation) {
     if !matches!(explanation.verdict, Verdict::Named | Verdict::Family) {
         return;
     }
-    let said = if removed(explanation) > 0.0 {
+    let removed = removed(explanation);
+    let said = if removed > 0.0 && (removed >= MOST || !explanation.remaining.adequate) {
         explanation.verdict = Verdict::Unexplained;
         "Something is left out, and the following is not sure, because other parameters of the simulator may look like it."
     } else {
         explanation.verdict = Verdict::Parameters;
         explanation.effects.clear();
-        "Other parameters explain blocks of the recording that were not fitted as well as the following does."
+        "Nothing is surely left out: beside other parameters, the following takes less than half of the mean square off blocks of the recording that were not fitted."
     };
     explanation.summary.insert(0, said.to_owned());
 }
@@ -140,7 +143,8 @@ mod tests {
             doubt(&mut e);
             (e.verdict, e.effects.len())
         };
-        assert_eq!(judged(1.0, 0.9, true), (Verdict::Unexplained, 1));
+        assert_eq!(judged(1.0, 0.9, false), (Verdict::Unexplained, 1));
+        assert_eq!(judged(1.0, 0.9, true), (Verdict::Parameters, 0));
         assert_eq!(judged(1.0, 1.1, true), (Verdict::Parameters, 0));
         assert_eq!(judged(1.0, 0.5, false), (Verdict::Unexplained, 1));
 

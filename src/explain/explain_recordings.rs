@@ -162,7 +162,7 @@ fn explain_free(
         let equations = columns::equations(&checked)?;
         let mut explanation = columns::explain_equations(&equations, &checked, &options.without)?;
         if equations.misfit > columns::REPRODUCED {
-            doubt_rough(&mut explanation);
+            columns::doubt_rough(&mut explanation, &equations, &checked);
         }
         Some(unless_closer(explanation, sensors()))
     };
@@ -174,13 +174,6 @@ fn explain_free(
     found.ok_or_else(|| ExplainError::NoEquations {
         name: name().unwrap_or_default(),
     })
-}
-
-/// What rough equations leave may be their own error, and a name beside it stand for that.
-fn doubt_rough(explanation: &mut Explanation) {
-    if !explanation.remaining.adequate {
-        doubt(explanation);
-    }
 }
 
 /// The explanation, or another one whose run follows the recording closer.
@@ -231,12 +224,12 @@ fn explain_nonlinear(
     if let Some(sensors) = sensors().filter(|s| stands_in(s, &explanation)) {
         return Ok(sensors);
     }
-    Ok(match by_equations() {
-        Some(mut equations) if stands_in(&equations, &explanation) => {
-            doubt_rough(&mut equations);
-            equations
+    Ok(match (by_equations(), &equations) {
+        (Some(mut other), Some(found)) if stands_in(&other, &explanation) => {
+            columns::doubt_rough(&mut other, found, checked);
+            other
         }
-        Some(equations) if agree(&equations, &explanation) => explanation,
+        (Some(other), _) if agree(&other, &explanation) => explanation,
         _ => {
             doubt(&mut explanation);
             explanation

@@ -355,6 +355,12 @@ pub struct Curve {
     pub resembles: Vec<(String, f64)>,
 }
 
+/// Values of which those that are missing are `null`.
+fn with_missing<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+    let values = Vec::<Option<f64>>::deserialize(from)?;
+    Ok(values.into_iter().map(|v| v.unwrap_or(f64::NAN)).collect())
+}
+
 /// Signals of one output of one recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SignalTraces {
@@ -366,7 +372,9 @@ pub struct SignalTraces {
     pub recording: usize,
     /// Time of each point in seconds.
     pub time: Vec<f64>,
-    /// As recorded.
+    /// As recorded; `null` in a document and NaN here where it was not.
+    #[serde(deserialize_with = "with_missing")]
+    #[schemars(with = "Vec<Option<f64>>")]
     pub recorded: Vec<f64>,
     /// The simulation as it was given.
     pub simulated: Vec<f64>,

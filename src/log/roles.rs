@@ -377,7 +377,8 @@ fn find(header: &Header, asked: &str) -> Result<Option<usize>, LogError> {
     let passes: [&dyn Fn(&Channel) -> bool; 3] = [
         &|candidate| *candidate == channel && (channel.unit.is_some() || candidate.unit.is_none()),
         &|candidate| candidate.answers_to(&channel, false),
-        &|candidate| candidate.answers_to(&channel, true),
+        // `t` is the time, and no temperature.
+        &|candidate| candidate.name != "t" && candidate.answers_to(&channel, true),
     ];
     for pass in passes {
         let mut found = header

@@ -159,6 +159,28 @@ impl Expressions {
         self.spans[id.index()]
     }
 
+    /// The variables of an expression, each once, in the order of the text.
+    pub(crate) fn variables(&self, root: ExpressionId) -> Vec<VariableId> {
+        let mut found = Vec::new();
+        let mut waiting = vec![root];
+        while let Some(id) = waiting.pop() {
+            let node = self.node(id);
+            if let Node::Variable(v) | Node::Previous(v) | Node::Derivative(v) = node
+                && !found.contains(&v)
+            {
+                found.push(v);
+            }
+            let operands: Vec<ExpressionId> = node.operands().collect();
+            waiting.extend(operands.into_iter().rev());
+        }
+        found
+    }
+
+    /// All nodes, in order.
+    pub(crate) fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
     /// Number of nodes.
     pub(crate) fn len(&self) -> usize {
         self.nodes.len()

@@ -156,7 +156,10 @@ impl Simulated for Plant {
     }
 
     fn for_search(&self) -> Arc<dyn Simulated> {
-        Arc::new(self.clone().with_accuracy(SEARCH_ACCURACY))
+        Arc::new(
+            self.clone()
+                .with_accuracy(self.accuracy.max(SEARCH_ACCURACY)),
+        )
     }
 
     fn equations(&self) -> Option<&Plant> {

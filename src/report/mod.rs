@@ -66,4 +66,6 @@ pub(crate) use plant::{frequency_grid, logarithmic, plant_fits, text_alone};
 pub use read_explanation::{is_explanation, parse_explanation, read_explanation};
 #[cfg(feature = "cli")]
 pub(crate) use reproduction_csv::reproduction_csv;
+#[cfg(feature = "cli")]
+pub(crate) use text::significant;
 pub use validation_document::{PLANT_VALIDATION_FORMAT, VALIDATION_FORMAT, ValidationDocument};

@@ -16,6 +16,7 @@ mod plant_coast_down;
 mod plant_explain;
 mod plant_feedback;
 mod plant_few_samples;
+mod plant_forms;
 mod plant_gravity;
 mod plant_held_out;
 mod plant_hypotheses;

@@ -169,4 +169,9 @@ fn an_effect_is_found_in_a_recording_with_missing_values() {
     );
     let fit = &said["fit"]["train"]["augmented"]["fit_percent"];
     assert!(fit.as_f64().unwrap() > 98.0, "{}", said["summary"]);
+
+    // What was written with values missing can be read again.
+    let again = folder.run(&["simulate", "e.json", "log.csv", "--inputs", "u"]);
+    let rows = columns(&again.ok()).1;
+    assert_eq!(rows[1].len(), 900);
 }

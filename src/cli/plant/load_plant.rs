@@ -100,11 +100,10 @@ fn of_text(name: &str, text: &str) -> anyhow::Result<LoadedPlant> {
     let spec =
         diagnose(text).map_err(|errors| anyhow::anyhow!("{}", render_all(&errors, name, text)))?;
     let unknown = unknown_units(&spec).into_iter();
-    let mut warnings: Vec<String> = unknown
+    let warnings: Vec<String> = unknown
         .map(|u| format!("{name}:{}:{}: {u}", u.line, u.column))
         .collect();
     let clock = other_clock(&spec).map(|c| format!("{name}:{}:{}: {c}", c.line, c.column));
-    warnings.extend(clock.iter().cloned());
     let plant = Plant::new(spec);
     let point = plant.nominal();
     Ok(LoadedPlant {
@@ -120,7 +119,8 @@ fn of_text(name: &str, text: &str) -> anyhow::Result<LoadedPlant> {
 
 /// Says on standard error what may be wrong with a plant that can be used.
 pub(crate) fn tell_warnings(loaded: &LoadedPlant, say: Verbosity) {
-    for warning in loaded.warnings.iter().filter(|_| !say.quiet) {
+    let all = loaded.warnings.iter().chain(&loaded.clock);
+    for warning in all.filter(|_| !say.quiet) {
         note(&format!("warning: {warning}\n"));
     }
 }

@@ -10,11 +10,14 @@ use super::units_of_logs::Channels;
 use crate::cli::flags::RoleFlags;
 use crate::cli::terminal::note;
 use crate::cli::{Outcome, Verbosity};
-use crate::explain::AugmentedPlant;
+use crate::explain::{AugmentedPlant, EffectFound};
 use crate::log::{Channel, Log, RoleNeed, Roles, Source, write_table};
 use crate::physics::estimate::{PlantRecording, start_by_least_squares};
-use crate::physics::{Hold, Point};
-use crate::report::{PlantDocument, is_plant};
+use crate::physics::{Hold, Plant, Point, Trajectory, VariableId};
+use crate::report::{PlantDocument, is_plant, significant};
+
+/// Noise takes a variable beyond what it was before in this part of the samples.
+const RARELY: f64 = 0.01;
 
 /// Where the states start.
 #[derive(Debug, Clone)]
@@ -141,10 +144,14 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
     if matches!(asked.start, Start::Text) {
         set_start(&plant, &mut point, &original.start)?;
     }
-    let mut outputs = plant
+    let run = plant
         .run(&log, &point, hold)
-        .map_err(|e| anyhow::anyhow!("{}: {e}", asked.plant.display()))?
-        .outputs;
+        .map_err(|e| anyhow::anyhow!("{}: {e}", asked.plant.display()))?;
+    if !say.quiet {
+        let effects = explanation.iter().flat_map(|e| &e.effects);
+        effects.for_each(|effect| tell_extrapolation(effect, &plant, &log, &run));
+    }
+    let mut outputs = run.outputs;
     original.add_remainder(&mut outputs);
     let declared = plant.spec.outputs().into_iter().map(|v| Channel {
         name: plant.spec.variable(v).column().to_owned(),
@@ -169,6 +176,46 @@ fn remembered(found: &AugmentedPlant, columns: &Channels) -> Option<Channels> {
     let names = (inputs, of(&found.outputs));
     let fits = names.0.len() == columns.0.len() && names.1.len() == columns.1.len();
     (fits && names != *columns).then_some(names)
+}
+
+/// Says how often a law is used beyond the values of its variable that it was found at.
+fn tell_extrapolation(effect: &EffectFound, plant: &Plant, log: &Log, run: &Trajectory) {
+    let column = |name: &String| -> Option<&[f64]> {
+        let is = |v: &VariableId| plant.spec.variable(*v).name == *name;
+        let state = plant.spec.states().iter().position(is);
+        let input = plant.spec.inputs().iter().position(is);
+        let state = state.and_then(|i| run.states.get(i));
+        let found = state.or_else(|| log.input_data.get(input?));
+        found.map(Vec::as_slice)
+    };
+    let Some(law) = &effect.law else { return };
+    let columns: Option<Vec<&[f64]>> = effect.depends.iter().map(column).collect();
+    let values: Vec<f64> = match columns.as_deref() {
+        Some(&[one]) if law.variable == effect.depends[0] => one.to_vec(),
+        Some(&[a, b])
+            if law.variable == format!("({} - {})", effect.depends[0], effect.depends[1]) =>
+        {
+            a.iter().zip(b).map(|(a, b)| a - b).collect()
+        }
+        _ => return,
+    };
+    let range = || law.at.iter().copied();
+    let (least, most) = (
+        range().fold(f64::INFINITY, f64::min),
+        range().fold(f64::NEG_INFINITY, f64::max),
+    );
+    let outside = values.iter().filter(|v| !(least..=most).contains(*v));
+    let share = outside.count() as f64 / values.len().max(1) as f64;
+    if share > RARELY {
+        note(&format!(
+            "warning: {} is outside {} to {} in {:.0} % of the samples; {} was found there and is extrapolated\n",
+            law.variable,
+            significant(least, 4),
+            significant(most, 4),
+            100.0 * share,
+            effect.effect.replace('_', " "),
+        ));
+    }
 }
 
 /// Says how many samples the initial state is estimated from, where that is not all.

@@ -1,8 +1,9 @@
 //! The answer where a simulation is known by its outputs, and equations reproduce them.
 
 use super::{Question, Reproduced, USEFUL, reproduce};
+use crate::explain::compare_explanations::doubt;
 use crate::explain::engine::terms::documentation::plant_effect;
-use crate::explain::explanation::Explanation;
+use crate::explain::explanation::{Explanation, FitSteps, Verdict};
 use crate::explain::linear::check::Checked;
 use crate::explain::plant_answer::{PlantOptions, explain_plant};
 use crate::explain::simulation::Simulation;
@@ -65,10 +66,62 @@ pub(crate) fn explain_equations(
         counted(found.plant.spec.states().len(), "state"),
         100.0 * found.misfit
     ));
+    doubt_below_remainder(&mut explanation, found, checked);
     if let Some(plant) = &mut explanation.plant {
         plant.simulation = Some(found.plant.spec.text.clone());
     }
     Some(explanation)
+}
+
+/// Takes a name back that explains less of every output than the equations miss of it: what they miss of the simulation, they may lack
+/// in the recording too. Nothing is missing surely where what other parameters leave is less than that.
+fn doubt_below_remainder(explanation: &mut Explanation, found: &Reproduced, checked: &Checked) {
+    let left = |steps: &FitSteps| steps.parameters_only.rmse.powi(2);
+    let explained = |steps: &FitSteps| left(steps) - steps.augmented.rmse.powi(2);
+    if explanation.verdict != Verdict::Named || found.exceeded(explanation, checked, &explained) {
+        return;
+    }
+    let said = if found.exceeded(explanation, checked, &left) {
+        explanation.verdict = Verdict::Unexplained;
+        "The following is not sure: it explains less of the recording than the equations miss of the simulated outputs."
+    } else {
+        explanation.verdict = Verdict::Parameters;
+        explanation.effects.clear();
+        "Nothing is surely left out: other parameters leave less of the recording than the equations miss of the simulated outputs."
+    };
+    explanation.summary.insert(0, said.to_owned());
+}
+
+/// What equations leave that reproduce the columns roughly may be their own error, and a name beside it stand for that: unless it is less
+/// than they miss.
+pub(crate) fn doubt_rough(explanation: &mut Explanation, found: &Reproduced, checked: &Checked) {
+    let left = |steps: &FitSteps| steps.augmented.rmse.powi(2);
+    if !explanation.remaining.adequate && found.exceeded(explanation, checked, &left) {
+        doubt(explanation);
+    }
+}
+
+impl Reproduced {
+    /// Whether this mean square is, in some output, larger than that of what the equations miss.
+    fn exceeded(
+        &self,
+        explanation: &Explanation,
+        checked: &Checked,
+        square: &dyn Fn(&FitSteps) -> f64,
+    ) -> bool {
+        let outputs = checked.recordings.first().map_or(&[][..], |r| &r.outputs);
+        let fit = &explanation.fit;
+        let several = fit.outputs.iter().map(|o| (&o.output, &o.train));
+        let mut each = several.collect::<Vec<_>>();
+        if each.is_empty() {
+            each.push((&fit.output, &fit.train));
+        }
+        each.into_iter().any(|(name, steps)| {
+            let place = outputs.iter().position(|output| output.name == *name);
+            let rest = place.map(|j| self.remainder.iter().skip(j).step_by(outputs.len()));
+            rest.is_none_or(|rest| square(steps) > rms(rest.flatten().copied()).powi(2))
+        })
+    }
 }
 
 /// Logs, and how a document refers to them.
@@ -86,7 +139,12 @@ fn difference(recorded: &[Log], simulated: &[Log], output: usize) -> f64 {
         let ours = r.output_data[output].iter();
         ours.zip(&s.output_data[output])
     });
-    let known = pairs.map(|(y, s)| y - s).filter(|e| e.is_finite());
+    rms(pairs.map(|(y, s)| y - s))
+}
+
+/// Root mean square of what is known.
+fn rms(errors: impl Iterator<Item = f64>) -> f64 {
+    let known = errors.filter(|e| e.is_finite());
     let (sum, count) = known.fold((0.0, 0), |(sum, n), e| (sum + e * e, n + 1));
     (sum / f64::from(count.max(1))).sqrt()
 }

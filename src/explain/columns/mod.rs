@@ -17,7 +17,7 @@ mod filtered_signals;
 mod regression;
 mod simulator_outputs;
 
-pub(crate) use columns_answer::{equations, explain_equations};
+pub(crate) use columns_answer::{doubt_rough, equations, explain_equations};
 pub(crate) use simulator_outputs::explain_sensors;
 
 use nalgebra::DMatrix;

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::explain::engine::thresholds::{FOLLOWS, MOST_STEPS};
+use crate::explain::engine::thresholds::{FOLLOWS, MOST_STEPS, limited};
 use crate::noise::Series;
 use crate::physics::estimate::{Effort, EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, Plant};
@@ -165,12 +165,12 @@ fn cut(recording: &PlantRecording, range: std::ops::Range<usize>) -> PlantRecord
 }
 
 /// The plant with every initial state free: a block does not begin where the recording does.
-fn released(plant: &Plant) -> Plant {
+fn released(plant: &Plant, study: &Study) -> Plant {
     let mut spec = plant.spec.clone();
     for state in spec.states() {
         spec.variables[state.index()].fixed = false;
     }
-    Plant::new(spec).with_most_steps(MOST_STEPS)
+    limited(Plant::new(spec), study, MOST_STEPS)
 }
 
 /// Options under which every parameter is free.
@@ -216,7 +216,7 @@ pub(super) fn held_out(
         .into_iter()
         .map(|t| t.states)
         .collect();
-    let released = released(plant);
+    let released = released(plant, &study);
     let at = |r: usize, k: usize| states[r].iter().map(move |x| x[k]);
     let outputs = study.outputs();
     let parameters = study.parameters();

@@ -3,7 +3,7 @@
 use crate::explain::engine::fitting::fitted::{Fitted, with_more};
 use crate::explain::engine::holdout::{Estimator, all_free};
 use crate::explain::engine::search::Found;
-use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
+use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH, limited};
 use crate::physics::estimate::{EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, Plant};
 
@@ -173,8 +173,9 @@ impl Found {
     /// Everything that the answer uses, fitted to all samples. None where that fails.
     pub(crate) fn on_all(mut self, recordings: &[PlantRecording], part: &Part) -> Option<Self> {
         let refit = |plant: &Plant, fit: &Fit, options: &EstimateOptions| -> Option<Fit> {
-            let limited = plant.clone().with_most_steps(MOST_STEPS);
-            let study = Study::new(&limited, recordings, options).ok()?;
+            let own = Study::new(plant, recordings, options).ok()?;
+            let limited = limited(plant.clone(), &own, MOST_STEPS);
+            let study = own.of(&limited, options).ok()?;
             let mut point = study.nominal();
             // Thinned recordings start where all samples do.
             let known = if part.every > 1 {

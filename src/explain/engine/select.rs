@@ -16,7 +16,7 @@ use crate::explain::engine::named_alone::named_alone;
 use crate::explain::engine::scope::Scope;
 use crate::explain::engine::search::{Found, Objective, search};
 use crate::explain::engine::terms::names::named;
-use crate::explain::engine::thresholds::{MOST_STEPS, SECOND, chance};
+use crate::explain::engine::thresholds::{MOST_STEPS, SECOND, chance, limited};
 use crate::physics::estimate::{EstimateError, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, Plant};
 
@@ -112,7 +112,9 @@ fn decide(
     // An unstable plant does not run freely: its likelihood has no judge. A stable one may follow once an effect is found.
     let mut judged = rivals.iter().any(|r| r.held_out.follows());
     let stays = !searches[0].misled && rivals.iter().any(|r| r.held_out.stays());
-    let mut chosen = (0, searches[0].accepted);
+    // What makes the free run of a plant that follows worse is no effect of it, even where free runs prove nothing.
+    let refuted = searches[0].misled && worsens(&rivals, 0, searches[0].accepted);
+    let mut chosen = (0, if refuted { 0 } else { searches[0].accepted });
     // Where least squares simulates better than the noise allows, a coloured noise stands for what is missing: little may be left
     // of the likelihood, and much of the free run. What least squares refutes is no longer among the rivals, and proves nothing.
     let is_last = |r: &&Rival| r.accepted == searches[0].accepted;
@@ -385,8 +387,9 @@ fn by_least_squares(
     hold: Hold,
 ) -> Option<(Fit, Vec<bool>, Option<Fit>)> {
     let options = all_free(plant, hold, Estimator::FreeRun);
-    let limited = plant.clone().with_most_steps(MOST_STEPS);
-    let study = Study::new(&limited, recordings, &options).ok()?;
+    let own = Study::new(plant, recordings, &options).ok()?;
+    let limited = limited(plant.clone(), &own, MOST_STEPS);
+    let study = own.of(&limited, &options).ok()?;
     let from_likelihood = study.least_squares(others.first()?);
     let otherwise = match nested {
         None => study.fit(Some(Form::FreeRun)).ok(),

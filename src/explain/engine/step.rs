@@ -7,9 +7,9 @@ use super::fitting::edit::Place;
 use super::fitting::finish::finished;
 use super::fitting::fitted::{Fitted, TIE, forms, order, searched, with_more};
 use super::fitting::formulas::formulas;
+use super::fitting::neighbours::{of_one_variable, richer_form};
 use super::fitting::refined_curve::refined_curve;
 use super::fitting::release::released;
-use super::fitting::richer_form::richer_form;
 use super::fitting::second_effect::drop_alike;
 use super::hypothesis::{Ground, trials};
 use super::scope::Scope;
@@ -137,14 +137,6 @@ fn still_shows((study, fit): (&Study, &Fit), lead: &Lead, spec: &ModelSpec) -> b
     left.is_none_or(|left| left < FOLLOWS * FOLLOWS)
 }
 
-/// When the recordings begin and the longest ends.
-fn duration(recordings: &[PlantRecording]) -> (f64, f64) {
-    let begin = recordings.first().map_or(0.0, |r| r.start_time);
-    let length = |r: &PlantRecording| r.samples() as f64 * r.sample_time;
-    let longest = recordings.iter().map(length).fold(0.0, f64::max);
-    (begin, begin + longest)
-}
-
 /// What a step has found.
 pub(super) struct Step {
     /// Candidates, best first.
@@ -262,7 +254,7 @@ pub(super) fn step(stage: &Stage) -> Step {
         .filter_map(|(i, screen, from, lead)| {
             let made = candidate(&plant.spec, &lead, &screen.arguments, recordings)?;
             let options = with_more(options, made.values.len());
-            let rough = made.rough(GLANCED_STEPS);
+            let rough = made.rough(study, GLANCED_STEPS);
             let inner = study.of(&rough, &options).ok()?;
             let start = match screen.strays {
                 true => started(&inner, &made, &lead, (study, from)),
@@ -308,7 +300,7 @@ pub(super) fn step(stage: &Stage) -> Step {
         .filter_map(|(lead, which, made, from)| {
             let arguments = &tried[which].0.arguments;
             let options = with_more(options, made.values.len());
-            let rough = made.rough(MOST_STEPS);
+            let rough = made.rough(study, MOST_STEPS);
             let inner = study.of(&rough, &options).ok()?;
             let starts = forms(from, fit, study.gains());
             let best = starts
@@ -324,14 +316,12 @@ pub(super) fn step(stage: &Stage) -> Step {
                 .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
             let gain = fit.criterion - best.criterion - searched(&lead, recordings);
             let argument = lead.argument.map(|a| &arguments[a]);
-            Some(Fitted {
-                depends: argument.map_or_else(Vec::new, |a| plant.spec.names(&a.variables)),
-                argument: argument.map_or_else(String::new, |a| a.expression.clone()),
-                range: argument.map_or_else(
-                    || duration(recordings),
-                    |a| (a.quantile(0.0), a.quantile(1.0)),
-                ),
-                travel: argument.map_or(0.0, |a| a.travel(recordings[0].sample_time)),
+            let fitted = Fitted {
+                depends: vec![],
+                argument: String::new(),
+                range: (0.0, 0.0),
+                travel: 0.0,
+                usual: 0.0,
                 shapes: best.point[parameters..][..lead.shapes.len()].to_vec(),
                 lead,
                 candidate: made,
@@ -340,7 +330,8 @@ pub(super) fn step(stage: &Stage) -> Step {
                 hypothesis: None,
                 explains: false,
                 proved: false,
-            })
+            };
+            Some(fitted.depending_on(argument, &plant.spec, recordings))
         })
         .collect();
     let fitted = drop_repeated(fitted);
@@ -371,8 +362,14 @@ pub(super) fn step(stage: &Stage) -> Step {
     // A formula says in two or three numbers what a curve says in nine or more. Of equals the curve stays: it is level beyond
     // its ends.
     let best = fitted.iter().map(|f| f.gain).fold(0.0, f64::max);
-    let close = |f: &Fitted| f.lead.curve.is_some() && f.gain > (1.0 - TIE.1) * best;
-    if let (Some(at), Some((screen, _))) = (fitted.iter().position(close), tried.first()) {
+    let unlisted = |f: &Fitted| {
+        let unnamed = f.hypothesis.is_none() && named(&plant.spec, f) == "law";
+        f.lead.curve.is_some() || unnamed && matches!(f.lead.place, Place::Equation(_))
+    };
+    let close = |f: &&Fitted| unlisted(f) && f.gain > (1.0 - TIE.1) * best;
+    let closest = (fitted.iter().filter(close)).max_by(|a, b| a.gain.total_cmp(&b.gain));
+    let closest = closest.and_then(|c| fitted.iter().position(|f| std::ptr::eq(f, c)));
+    if let (Some(at), Some((screen, _))) = (closest, tried.first()) {
         let mut better = formulas(&fitted[at], &screen.arguments, &ground);
         if let Some(finer) = refined_curve(&fitted[at], &screen.arguments, &ground) {
             better.extend(formulas(&finer, &screen.arguments, &ground));
@@ -386,9 +383,10 @@ pub(super) fn step(stage: &Stage) -> Step {
         let close = |f: &&mut Fitted| f.gain > (1.0 - TIE.1) * best && f.hypothesis.is_none();
         let gain = |a: &&mut Fitted, b: &&mut Fitted| a.gain.total_cmp(&b.gain);
         if let Some(one) = fitted.iter_mut().filter(close).max_by(gain)
-            && let Some(richer) = richer_form(one, &screen.arguments, &ground)
+            && let Some(better) = richer_form(one, &screen.arguments, &ground)
+                .or_else(|| of_one_variable(one, &screen.arguments, &ground))
         {
-            *one = richer;
+            *one = better;
         }
     }
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));

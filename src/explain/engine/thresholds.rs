@@ -2,7 +2,8 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::physics::estimate::Effort;
+use crate::physics::Plant;
+use crate::physics::estimate::{Effort, Study};
 
 /// Leads of each screen that are fitted with the noise of the fit before.
 pub(crate) const GLANCED: usize = 12;
@@ -24,6 +25,15 @@ pub(crate) const FOLLOWS: f64 = 0.95;
 /// Steps a sample that a candidate may need, on average; one that needs more is left out, for the time it costs.
 pub(crate) const GLANCED_STEPS: usize = 20;
 pub(crate) const MOST_STEPS: usize = 60;
+/// ... or so many times what the plant needs without it, or what takes so many steps in all, which is a moment.
+const TIMES_OWN: usize = 3;
+const CHEAP_STEPS: usize = 200_000;
+
+/// A plant that may need so many steps a sample, and more where it needed them before, or there are few samples.
+pub(crate) fn limited(plant: Plant, study: &Study, most: usize) -> Plant {
+    let own = TIMES_OWN * study.steps_a_sample();
+    plant.with_most_steps(most.max(own).max(CHEAP_STEPS / study.samples().max(1)))
+}
 /// The best of these are fitted with a noise model of their own, and the best of them until nothing changes.
 pub(crate) const FITTED: usize = 5;
 /// ... and more of short recordings, whose fits cost little and whose tests order leads badly: so many as have this many values

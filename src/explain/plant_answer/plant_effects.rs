@@ -287,7 +287,8 @@ impl Answer<'_> {
                     [one] => fitted.argument.replace(one, "z"),
                     _ => "z".to_owned(),
                 };
-                let form = filled(term.form, term, &argument, &[], &shapes, 1.0);
+                let form = filled(term.form, term, &argument, &[], &shapes, 1.0)
+                    .replace("{usual}", &format!("({:e})", fitted.usual));
                 format!("{strength}*({form})")
             }
         };

@@ -51,10 +51,10 @@ pub(super) struct Told<'a> {
 impl Answer<'_> {
     pub(super) fn summary(&self, told: &Told) -> Vec<String> {
         let mut lines = Vec::new();
-        let bounds = at_bounds(&self.plant.spec, &self.found.fit.point);
+        let bounds = at_bounds(&self.plant.spec, &self.found.fit.point, &self.covariance);
         match told.verdict {
             Verdict::Consistent | Verdict::Parameters => {
-                lines.extend(nothing_missing(told, !bounds.is_empty()));
+                lines.extend(nothing_missing(told, !bounds.determined.is_empty()));
             }
             Verdict::Named | Verdict::Family => {
                 for (effect, fitted) in told.effects.iter().zip(self.effects()) {
@@ -116,7 +116,13 @@ impl Answer<'_> {
             }
         }
         lines.extend(changes(told.parameters));
-        lines.extend(bounds_in_words(&bounds, told));
+        lines.extend(bounds_in_words(&bounds.determined, told));
+        lines.extend((!bounds.undetermined.is_empty()).then(|| {
+            format!(
+                "At a bound of the text, because the recording hardly determines it: {}.",
+                bounds.undetermined.join(", ")
+            )
+        }));
         let with_effects = !told.effects.is_empty();
         if with_effects {
             lines.extend(held_out(told.outputs));

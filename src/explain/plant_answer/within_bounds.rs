@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use crate::explain::document::sentences::number;
-use crate::physics::ModelSpec;
+use crate::physics::{ModelSpec, Variable};
 
 /// A covariance of numbers that begin with the parameters of a text, given that these are within their bounds: an observation of
 /// each with the variance of a uniform distribution (the update of a Kalman filter, one parameter after the other). Parameters
@@ -23,28 +23,44 @@ pub(super) fn within_bounds(spec: &ModelSpec, mut covariance: DMatrix<f64>) -> D
 /// Nearer to a bound than this part of the range between them, or of the bound where there is one, a value is at it.
 const AT_BOUND: f64 = 1e-3;
 
-/// Parameters that stop at a bound of the text, each with it. `values` begins with those of the parameters.
-pub(super) fn at_bounds(spec: &ModelSpec, values: &[f64]) -> Vec<String> {
-    let parameters = spec.parameters().into_iter().zip(values);
-    parameters
-        .filter_map(|(v, &value)| {
-            let variable = spec.variable(v);
-            let range = variable.max - variable.min;
-            let near = |bound: f64| {
-                let size = if range.is_finite() {
-                    range
-                } else {
-                    bound.abs()
-                };
-                bound.is_finite() && range > 0.0 && (value - bound).abs() <= AT_BOUND * size
-            };
-            let (word, bound) = [("min", variable.min), ("max", variable.max)]
-                .into_iter()
-                .find(|(_, bound)| near(*bound))?;
-            let bound = number(bound);
-            Some(format!("{} ({word} = {bound})", variable.column()))
-        })
-        .collect()
+/// Parameters that stop at a bound of the text, each with it.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct AtBounds {
+    /// The recording asks for values beyond the bound.
+    pub(super) determined: Vec<String>,
+    /// The recording alone says less of them than their bounds do.
+    pub(super) undetermined: Vec<String>,
+}
+
+/// Parameters that stop at a bound. `values` and their covariance, without bounds, begin with those of the parameters.
+pub(super) fn at_bounds(spec: &ModelSpec, values: &[f64], covariance: &DMatrix<f64>) -> AtBounds {
+    let mut found = AtBounds::default();
+    for (i, (v, &value)) in spec.parameters().into_iter().zip(values).enumerate() {
+        let variable = spec.variable(v);
+        let is_open = || variable.max - variable.min < covariance[(i, i)].sqrt();
+        match said_at_bound(variable, value) {
+            Some(said) if is_open() => found.undetermined.push(said),
+            said => found.determined.extend(said),
+        }
+    }
+    found
+}
+
+fn said_at_bound(variable: &Variable, value: f64) -> Option<String> {
+    let range = variable.max - variable.min;
+    let near = |bound: f64| {
+        let size = if range.is_finite() {
+            range
+        } else {
+            bound.abs()
+        };
+        bound.is_finite() && range > 0.0 && (value - bound).abs() <= AT_BOUND * size
+    };
+    let (word, bound) = [("min", variable.min), ("max", variable.max)]
+        .into_iter()
+        .find(|(_, bound)| near(*bound))?;
+    let bound = number(bound);
+    Some(format!("{} ({word} = {bound})", variable.column()))
 }
 
 #[cfg(test)]
@@ -59,9 +75,16 @@ mod tests {
                input Real u; output Real y; Real v;
              equation m*der(v) = u - d*v - k; y = v; end Cart;";
         let spec = parse(text).unwrap();
-        let said = at_bounds(&spec, &[2.9999, 0.0, 5.0]);
-        assert_eq!(said, ["m (max = 3.000)", "d (min = 0)"]);
-        assert!(at_bounds(&spec, &[2.0, 0.1, 5.0]).is_empty());
+        let mut covariance = DMatrix::identity(3, 3);
+        let said = at_bounds(&spec, &[2.9999, 0.0, 5.0], &covariance);
+        assert_eq!(said.determined, ["m (max = 3.000)", "d (min = 0)"]);
+        let inside = at_bounds(&spec, &[2.0, 0.1, 5.0], &covariance);
+        assert_eq!(inside, AtBounds::default());
+        // The recording says less of the mass than its bounds, 2 apart.
+        covariance[(0, 0)] = 9.0;
+        let said = at_bounds(&spec, &[2.9999, 0.0, 5.0], &covariance);
+        assert_eq!(said.undetermined, ["m (max = 3.000)"]);
+        assert_eq!(said.determined, ["d (min = 0)"]);
     }
 
     #[test]

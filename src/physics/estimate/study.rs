@@ -9,7 +9,7 @@ use super::optimise::{Effort, Range, minimise};
 use super::problem::{EstimateError, PlantRecording, Problem, penalty};
 use super::{EstimateOptions, Fit, Form, SEARCH, best_fit};
 use crate::noise::{Colours, Mask, Noise, Series, effective_samples};
-use crate::physics::simulation::{Hold, Observer, Plant, Point, Trajectory};
+use crate::physics::simulation::{Hold, Observer, Plan, Plant, Point, Trajectory};
 
 /// A free run whose error is more than twice that of an observer strays: the logarithm of the ratio of their variances.
 const STRAYS: f64 = 1.386;
@@ -55,6 +55,18 @@ impl<'a> Study<'a> {
             information,
             ..self
         }
+    }
+
+    /// Steps a sample that the plant needs with the values of its text, an implicit one counted as those that it costs.
+    pub(crate) fn steps_a_sample(&self) -> usize {
+        let plans = self.problem.plans.iter();
+        let cost: usize = plans.map(Plan::cost).sum();
+        cost.div_ceil(self.samples().max(1))
+    }
+
+    /// Samples of all recordings.
+    pub(crate) fn samples(&self) -> usize {
+        self.problem.recordings.iter().map(|r| r.samples()).sum()
     }
 
     /// Information in a value, as a part of that in a value with independent noise.

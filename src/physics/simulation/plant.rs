@@ -10,7 +10,7 @@ use super::field::Field;
 use super::integrator::{IMPLICIT, Integrator};
 use super::linear::{Linearity, Propagator};
 use super::step::Stages;
-use super::step_control::{STEP_ACCURACY, StepControl};
+use super::step_control::{IMPLICIT_COST, STEP_ACCURACY, StepControl};
 use super::tape::Tape;
 use crate::physics::expression::{ExpressionId, Node};
 use crate::physics::spec::ModelSpec;
@@ -115,6 +115,11 @@ impl Plan {
     /// Number of steps.
     pub fn steps(&self) -> usize {
         self.steps.len()
+    }
+
+    /// What the steps cost, in explicit ones.
+    pub(crate) fn cost(&self) -> usize {
+        self.steps() + (IMPLICIT_COST - 1) * self.implicit_steps()
     }
 
     /// Number of implicit steps.
@@ -222,7 +227,7 @@ pub struct Plant {
     /// Values of the parameters, where they are not those of the text.
     nominal: Option<Vec<f64>>,
     /// Error of a step as a part of how far a state has moved.
-    pub(super) accuracy: f64,
+    pub(in crate::physics) accuracy: f64,
     /// Steps a sample that a run may take on average, where fewer are allowed than is usual.
     pub(super) most_steps: Option<usize>,
 }

@@ -40,7 +40,7 @@ const STIFF: u8 = 7;
 /// Step times rate up to which the explicit method is stable (2.8 for rates that are real).
 const STABLE: f64 = 2.5;
 /// An implicit step costs about as much as so many explicit ones.
-const IMPLICIT_COST: usize = 4;
+pub(super) const IMPLICIT_COST: usize = 4;
 /// A run that may take so many steps a sample may take those of so many samples more at any time: what is hopeless ends early.
 const GRACE: usize = 200;
 /// After so many stiff samples the explicit method is tried again.

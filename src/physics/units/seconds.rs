@@ -109,21 +109,8 @@ fn list(spec: &ModelSpec, variables: &[VariableId]) -> String {
 
 /// Variables in an expression whose units have minutes, hours or days.
 fn slow_variables(spec: &ModelSpec, root: ExpressionId) -> Vec<VariableId> {
-    let mut found = Vec::new();
-    let mut waiting = vec![root];
-    while let Some(id) = waiting.pop() {
-        let node = spec.expressions.node(id);
-        if let Node::Variable(v) | Node::Previous(v) | Node::Derivative(v) = node
-            && is_slow(spec, v)
-            && !found.contains(&v)
-        {
-            found.push(v);
-        }
-        // In the order of the text.
-        let operands: Vec<ExpressionId> = node.operands().collect();
-        waiting.extend(operands.into_iter().rev());
-    }
-    found
+    let all = spec.expressions.variables(root).into_iter();
+    all.filter(|&v| is_slow(spec, v)).collect()
 }
 
 fn is_slow(spec: &ModelSpec, v: VariableId) -> bool {

@@ -21,7 +21,7 @@ pub(crate) use model::{
     test_tables, too_short,
 };
 #[cfg(feature = "report")]
-pub(crate) use number::percent;
+pub(crate) use number::{percent, significant};
 #[cfg(feature = "cli")]
 pub(crate) use plant::linearisation_text;
 #[cfg(feature = "report")]

@@ -5,8 +5,8 @@ use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::term::{Port, Starts};
 use crate::explain::engine::terms::values::filled;
-use crate::explain::engine::thresholds::GLANCED_ACCURACY;
-use crate::physics::estimate::{Fit, PlantRecording};
+use crate::explain::engine::thresholds::{GLANCED_ACCURACY, limited};
+use crate::physics::estimate::{Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Node, Plant};
 
 /// Shortest time constant, in samples.
@@ -123,7 +123,14 @@ pub(crate) fn candidate(
             format!("({})", &spec.text[span.start..span.end])
         },
     );
-    let body = filled(term.form, term, &text, &memories, &shapes, h).replace("{a}", &factor);
+    let usual = argument.map_or(0.0, Argument::usual);
+    let usual = match usual < 0.0 {
+        true => format!("({usual})"),
+        false => usual.to_string(),
+    };
+    let body = filled(term.form, term, &text, &memories, &shapes, h)
+        .replace("{a}", &factor)
+        .replace("{usual}", &usual);
     let rate = argument.and_then(|a| a.rate.as_deref());
     let body = match body.contains("{dz}") {
         true => body.replace("{dz}", rate?),
@@ -242,10 +249,11 @@ pub(in crate::explain::engine) fn equation_text(
 }
 
 impl Candidate {
-    /// The plant with the term, simulated as accurately as fits need that are only compared, in so many steps a sample at most.
-    pub(crate) fn rough(&self, most_steps: usize) -> Plant {
+    /// The plant with the term, simulated as accurately as fits need that are only compared, in so many steps a sample at most; the
+    /// study is that of the plant without it.
+    pub(crate) fn rough(&self, study: &Study, most_steps: usize) -> Plant {
         let plant = self.plant.clone().with_accuracy(GLANCED_ACCURACY);
-        plant.with_most_steps(most_steps)
+        limited(plant, study, most_steps)
     }
 
     /// The numbers of a fit of the plant without the term, with the term's.

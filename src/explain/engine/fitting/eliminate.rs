@@ -8,7 +8,7 @@ use crate::explain::engine::fitting::edit::Place;
 use crate::explain::engine::fitting::fitted::{Fitted, searched, with_more};
 use crate::explain::engine::screening::path::{hooked, path};
 use crate::explain::engine::terms::argument::arguments;
-use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
+use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH, limited};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Plant};
 
@@ -71,7 +71,7 @@ pub(in crate::explain::engine) fn alone(
     let mut from = made.from(&without, own);
     from.point[own..][..values.len()].copy_from_slice(values);
     let options = with_more(options, made.values.len());
-    let limited = made.plant.clone().with_most_steps(MOST_STEPS);
+    let limited = limited(made.plant.clone(), study, MOST_STEPS);
     let inner = study.of(&limited, &options).ok()?;
     let fit = inner.refit(&from, ROUNDS, THOROUGH)?;
     let gain = study.criterion(baseline) - fit.criterion - searched(&lead, recordings);

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::explain::engine::fitting::fitted::{Fitted, searched, with_more};
 use crate::explain::engine::screening::along::range_along;
 use crate::explain::engine::terms::names::{SPECIFIC, rank};
-use crate::explain::engine::thresholds::{FINISHED, MOST_STEPS, ROUNDS, THOROUGH};
+use crate::explain::engine::thresholds::{FINISHED, MOST_STEPS, ROUNDS, THOROUGH, limited};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 
 /// Names that gain this part of the best are finished too.
@@ -35,7 +35,7 @@ pub(in crate::explain::engine) fn finished(
                 return None;
             }
             let options = with_more(options, f.candidate.values.len());
-            let limited = f.candidate.plant.clone().with_most_steps(MOST_STEPS);
+            let limited = limited(f.candidate.plant.clone(), study, MOST_STEPS);
             let inner = study.of(&limited, &options).ok()?;
             let refined = inner.refit(&f.fit, ROUNDS, THOROUGH)?;
             // Of a plant that the term has changed much, its variable has other values than before.

@@ -3,6 +3,7 @@
 use crate::explain::engine::fitting::candidate::Candidate;
 use crate::explain::engine::hypothesis::prefer_asked;
 use crate::explain::engine::screening::screen::Lead;
+use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::names::{SPECIFIC, name_rank, named, rank, special_case};
 use crate::explain::engine::terms::term::Starts;
 use crate::physics::ModelSpec;
@@ -34,6 +35,8 @@ pub(crate) struct Fitted {
     /// Values that the argument had, or times of the recordings where there is none, and the range of its integral.
     pub(crate) range: (f64, f64),
     pub(crate) travel: f64,
+    /// A usual value of the argument.
+    pub(crate) usual: f64,
     /// Fitted values of the shapes.
     pub(crate) shapes: Vec<f64>,
     pub(crate) candidate: Candidate,
@@ -52,6 +55,30 @@ impl Fitted {
     /// The other numbers of its fit, as those of the plant without it, which has so many parameters.
     pub(in crate::explain::engine) fn without_term(&self, parameters: usize) -> Fit {
         self.candidate.without(&self.fit, parameters)
+    }
+
+    /// The same with what its term is a function of: time where there is no argument.
+    pub(in crate::explain::engine) fn depending_on(
+        self,
+        argument: Option<&Argument>,
+        spec: &ModelSpec,
+        recordings: &[PlantRecording],
+    ) -> Self {
+        let Some(argument) = argument else {
+            let begin = recordings.first().map_or(0.0, |r| r.start_time);
+            let length = |r: &PlantRecording| r.samples() as f64 * r.sample_time;
+            let longest = recordings.iter().map(length).fold(0.0, f64::max);
+            let range = (begin, begin + longest);
+            return Self { range, ..self };
+        };
+        Self {
+            depends: spec.names(&argument.variables),
+            argument: argument.expression.clone(),
+            range: (argument.quantile(0.0), argument.quantile(1.0)),
+            travel: (recordings.first()).map_or(0.0, |r| argument.travel(r.sample_time)),
+            usual: argument.usual(),
+            ..self
+        }
     }
 
     /// The factor of a term whose size its shapes do not fix.

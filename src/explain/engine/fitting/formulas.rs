@@ -1,4 +1,4 @@
-//! The shortest formula for a curve that nobody listed: each is fitted to the curve, and the nearest in its place.
+//! The shortest formula for a function that nobody listed: each is fitted to the function, and the nearest in its place.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -42,6 +42,8 @@ const FORMULAS: &[Term] = &[
 /// Formulas that are fitted to the recording: those nearest to the curve, and of the terms of the library those nearest to it.
 const FITTED: usize = 3;
 const LISTED: usize = 2;
+/// Parts of the values of a variable between which a function may turn.
+const KNOTS: u8 = 10;
 /// Steps in which the straight part of a curve passes into the parameters.
 const PASSES: usize = 5;
 
@@ -63,7 +65,7 @@ struct Near {
     left: f64,
 }
 
-/// The formulas near to the curve of a fit, fitted in its place; none where it is no curve.
+/// The formulas near to the function of a fit, fitted in its place; none where it is no function of one variable.
 pub(in crate::explain::engine) fn formulas(
     best: &Fitted,
     arguments: &[Argument],
@@ -77,7 +79,8 @@ pub(in crate::explain::engine) fn formulas(
             let best = level.as_ref().unwrap_or(best);
             let start = (&near.shapes[..], near.strength);
             let refit = |study: &Study, from: &Fit| study.refit(from, ROUNDS, THOROUGH);
-            in_its_place(best, near.term, start, &refit, arguments, ground)
+            let what = (near.term, best.lead.argument);
+            in_its_place(best, what, start, &refit, arguments, ground)
         })
         .collect()
 }
@@ -95,7 +98,7 @@ fn fitted_curve(best: &Fitted, ground: &Ground) -> Option<Curve> {
 fn levelled(best: &Fitted, slope: f64, ground: &Ground) -> Option<Fitted> {
     let curve = fitted_curve(best, ground)?;
     let options = with_more(ground.options, best.candidate.values.len());
-    let rough = best.candidate.rough(MOST_STEPS);
+    let rough = best.candidate.rough(ground.study, MOST_STEPS);
     let inner = ground.study.of(&rough, &options).ok()?;
     let first = ground.study.parameters();
     let held: Vec<usize> = (first..first + curve.knots.len()).collect();
@@ -116,15 +119,45 @@ fn levelled(best: &Fitted, slope: f64, ground: &Ground) -> Option<Fitted> {
     })
 }
 
-/// The regression of the curve on each formula, beside a constant and a slope: those may be what parameters do.
+/// What a fitted function adds along the recordings, and where it may turn.
+fn along_recordings(
+    best: &Fitted,
+    arguments: &[Argument],
+    ground: &Ground,
+) -> Option<(DVector<f64>, Vec<f64>)> {
+    let at = best.lead.argument?;
+    let argument = &arguments[at];
+    if let Some(curve) = fitted_curve(best, ground) {
+        let z = argument.values.iter().flatten();
+        let values = z.map(|&z| curve.at(z)).collect::<Vec<_>>();
+        return Some((DVector::from_vec(values), curve.knots));
+    }
+    let term = best.lead.term;
+    if !term.memories.is_empty() || !term.free_strength {
+        return None;
+    }
+    let instance = Instance {
+        term,
+        argument: Some(at),
+        shapes: best.shapes.clone(),
+    };
+    let values = evaluate(&[instance], arguments, ground.recordings)?;
+    let values = best.strength() * DVector::from_vec(values.concat().concat());
+    let knots = (1..KNOTS).map(|k| argument.quantile(f64::from(k) / f64::from(KNOTS)));
+    Some((values, knots.collect()))
+}
+
+/// The regression of the function on each formula, beside a constant and a slope: those may be what parameters do.
 fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec<Near>> {
-    let curve = fitted_curve(best, ground)?;
+    let (wanted, knots) = along_recordings(best, arguments, ground)?;
     let at = best.lead.argument?;
     let argument = &arguments[at];
     let in_equation = matches!(best.lead.place, Place::Equation(_));
     let listed = TERMS.iter().filter(|term| {
         let is_function = term.memories.is_empty() && term.free_strength;
-        in_equation && is_function && term.port == Port::Equation && term.needs == Needs::Anything
+        let another = *term != best.lead.term;
+        let fits = in_equation && term.port == Port::Equation && argument.serves(term.needs);
+        is_function && another && fits
     });
     let instances: Vec<Instance> = FORMULAS
         .iter()
@@ -138,7 +171,7 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
                 let widths: Vec<Vec<f64>> = widths.cloned().collect();
                 for (shapes, knot) in widths
                     .iter()
-                    .flat_map(|w| curve.knots.iter().map(move |k| (w, k)))
+                    .flat_map(|w| knots.iter().map(move |k| (w, k)))
                 {
                     let mut moved = shapes.clone();
                     moved[middle] = *knot;
@@ -154,7 +187,6 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
         .collect();
     let columns = evaluate(&instances, arguments, ground.recordings)?;
     let z: Vec<f64> = argument.values.concat();
-    let wanted = DVector::from_iterator(z.len(), z.iter().map(|&z| curve.at(z)));
     let mut found: Vec<Near> = Vec::new();
     for (instance, column) in instances.into_iter().zip(columns) {
         let column = column.concat();
@@ -206,33 +238,34 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
     Some(found)
 }
 
-/// Another term at the place of a fit, fitted from these values of its shapes and its strength.
+/// Another term, or another argument, at the place of a fit, fitted from these values of its shapes and its strength.
 pub(super) fn in_its_place(
     best: &Fitted,
-    term: &'static Term,
+    (term, argument): (&'static Term, Option<usize>),
     (shapes, strength): (&[f64], f64),
     fitted: &dyn Fn(&Study, &Fit) -> Option<Fit>,
     arguments: &[Argument],
     ground: &Ground,
 ) -> Option<Fitted> {
     let (study, plant) = (ground.study, ground.plant);
-    let mut lead =
-        Lead::untested(term, best.lead.place).at(best.lead.place, best.lead.argument, shapes);
+    let mut lead = Lead::untested(term, best.lead.place).at(best.lead.place, argument, shapes);
     lead.strength = strength;
     let made = candidate(&plant.spec, &lead, arguments, ground.recordings)?;
     let options = with_more(ground.options, made.values.len());
-    let rough = made.rough(MOST_STEPS);
+    let rough = made.rough(study, MOST_STEPS);
     let inner = study.of(&rough, &options).ok()?;
     let parameters = study.parameters();
     let without = best.without_term(parameters);
     let start = made.from(&without, parameters);
     let fit = fitted(&inner, &start)?;
-    Some(Fitted {
+    let fitted = Fitted {
         gain: ground.fit.criterion - fit.criterion - searched(&lead, ground.recordings),
         shapes: fit.point[parameters..][..lead.shapes.len()].to_vec(),
         lead,
         candidate: made,
         fit,
         ..best.clone()
-    })
+    };
+    let argument = argument.map(|a| &arguments[a]);
+    Some(fitted.depending_on(argument, &plant.spec, ground.recordings))
 }

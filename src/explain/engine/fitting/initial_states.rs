@@ -4,7 +4,7 @@
 //! elsewhere, such as with walls colder than the room, and a fresh recording starts elsewhere again.
 
 use crate::explain::engine::search::Found;
-use crate::explain::engine::thresholds::{MOST_STEPS, THOROUGH};
+use crate::explain::engine::thresholds::{MOST_STEPS, THOROUGH, limited};
 use crate::physics::estimate::{Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Plant, VariableId, parse};
 
@@ -44,7 +44,7 @@ impl Found {
         let freed = with_free_states(&self.plant)?;
         let held = Study::new(&self.plant, recordings, &self.options).ok()?;
         let held = held.with_information(self.information);
-        let limited = freed.clone().with_most_steps(MOST_STEPS);
+        let limited = limited(freed.clone(), &held, MOST_STEPS);
         let study = held.of(&limited, &self.options).ok()?;
         let first = study.parameters();
         let own = held.nominal().len();

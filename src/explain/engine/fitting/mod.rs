@@ -7,7 +7,7 @@ pub(crate) mod finish;
 pub(crate) mod fitted;
 pub(crate) mod formulas;
 pub(crate) mod initial_states;
+pub(crate) mod neighbours;
 pub(crate) mod refined_curve;
 pub(crate) mod release;
-pub(crate) mod richer_form;
 pub(crate) mod second_effect;

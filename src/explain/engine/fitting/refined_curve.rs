@@ -76,7 +76,7 @@ fn refined(
     };
     let rough = |made: &Candidate| {
         let options = with_more(ground.options, made.values.len());
-        (made.rough(MOST_STEPS), options)
+        (made.rough(ground.study, MOST_STEPS), options)
     };
     // A score test of every new knot, beside the curve as it is: with all of them in it, it is the same function.
     let projection = {

@@ -145,6 +145,7 @@ impl Hypothesis {
             argument: String::new(),
             shapes: vec![],
             travel: 0.0,
+            usual: 0.0,
             depends: self.depends.clone(),
             range,
             gain: ground.fit.criterion - fit.criterion - searched,

@@ -10,6 +10,7 @@ use crate::explain::engine::terms::argument::{Argument, ArgumentForm};
 use crate::explain::engine::terms::library::CURVE;
 use crate::explain::engine::terms::term::Port;
 use crate::noise::Series;
+use crate::physics::{ModelSpec, Unknown, VariableKind};
 
 /// Knots of a curve: half of them at quantiles, half at equal distances.
 const KNOTS: usize = 9;
@@ -17,6 +18,8 @@ const KNOTS: usize = 9;
 const NEAREST: f64 = 0.03;
 /// Places and arguments that are tried: those of the best terms in equations, and of the best at inputs.
 const PAIRS: usize = 2;
+/// Characteristics of the plant that are tried as curves.
+const CHARACTERISTICS: usize = 3;
 /// Statistics that differ by less than this part are rounding.
 const SAME: f64 = 1e-6;
 /// Added to the diagonal of the regression, as a part of it: the straight part of a curve may be what parameters do.
@@ -83,8 +86,42 @@ impl Curve {
     }
 }
 
-/// Curves at the places and of the arguments of the best terms.
+/// Equations that say what a variable is as a function of one other, or of a difference, and that argument: springs, resistances,
+/// valves. Their straight lines are curves in truth, however little a test along a wrong run shows of it.
+fn characteristics(
+    spec: &ModelSpec,
+    places: &[Place],
+    arguments: &[Argument],
+) -> Vec<(Place, usize)> {
+    let of = |place: &Place| -> Option<(Place, usize)> {
+        let Place::Equation(at) = *place else {
+            return None;
+        };
+        let equation = &spec.equations[at];
+        let is_sensor = spec.variable(equation.unknown.variable()).output;
+        if is_sensor || matches!(equation.unknown, Unknown::Derivative(_)) {
+            return None;
+        }
+        let mut own = spec.expressions.variables(equation.right);
+        own.retain(|&v| {
+            let kind = spec.variable(v).kind;
+            !matches!(kind, VariableKind::Parameter | VariableKind::Constant)
+        });
+        own.sort_unstable();
+        let is_own = |a: &Argument| {
+            let mut variables = a.variables.clone();
+            variables.sort_unstable();
+            let form = matches!(a.form, ArgumentForm::Variable | ArgumentForm::Difference);
+            form && variables == own
+        };
+        Some((*place, arguments.iter().position(is_own)?))
+    };
+    places.iter().filter_map(of).take(CHARACTERISTICS).collect()
+}
+
+/// Curves at the places and of the arguments of the best terms, and of the plant's own characteristics.
 pub(in crate::explain::engine) fn curves(
+    spec: &ModelSpec,
     leads: &[Lead],
     arguments: &[Argument],
     hooked: &Hooked,
@@ -108,8 +145,16 @@ pub(in crate::explain::engine) fn curves(
         pairs.truncate(PAIRS);
         pairs
     };
-    let pairs = [Port::Input, Port::Equation].into_iter().flat_map(at_port);
-    let each = pairs.filter_map(|(place, at)| {
+    let mut pairs: Vec<(Place, usize)> = [Port::Input, Port::Equation]
+        .into_iter()
+        .flat_map(at_port)
+        .collect();
+    for pair in characteristics(spec, &hooked.places, arguments) {
+        if !pairs.contains(&pair) {
+            pairs.push(pair);
+        }
+    }
+    let each = pairs.into_iter().filter_map(|(place, at)| {
         let argument = &arguments[at];
         let hook = hooked.places.iter().position(|p| *p == place)?;
         let knots = knots(argument);

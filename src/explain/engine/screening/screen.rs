@@ -163,6 +163,7 @@ pub(crate) fn screen(
                 a.spread() > 0.0
                     && (a.serves(term.needs)
                         || a.form == ArgumentForm::Product && term.id == "linear")
+                    && (!term.remembers_way() || a.reverses())
                     && match term.port {
                         Port::Input => a.variables.len() == 1 && inputs.contains(&a.variables[0]),
                         Port::Sensor => a.variables.len() == 1 && shown.contains(&a.variables[0]),
@@ -181,13 +182,6 @@ pub(crate) fn screen(
                     argument,
                     shapes,
                 });
-            }
-        }
-    }
-    for i in &mut instances {
-        for (shape, value) in i.term.shapes.iter().zip(&mut i.shapes) {
-            if let (Starts::Waves(_), Some(a)) = (shape.starts, i.argument) {
-                *value *= 2.0 * std::f64::consts::PI / arguments[a].range();
             }
         }
     }
@@ -222,7 +216,15 @@ pub(crate) fn screen(
     let map = map(&leads, spec, &arguments, study.count(), significant);
     let leads = distinct(leads, spec, &arguments);
     let whiten = |series: &Series| fit.noise.whiten_kept(series, study.mask());
-    let curves = curves(&leads, &arguments, &hooked, &path, &projection, &whiten);
+    let curves = curves(
+        spec,
+        &leads,
+        &arguments,
+        &hooked,
+        &path,
+        &projection,
+        &whiten,
+    );
     Some(Screen {
         leads,
         curves,

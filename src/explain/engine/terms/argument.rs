@@ -15,6 +15,8 @@ pub(crate) enum ArgumentForm {
     Variable,
     /// A difference of two variables of one unit.
     Difference,
+    /// A difference of a variable and a number or parameter that stands in the text.
+    FromReference,
     Product,
     /// The difference of the fourth powers of two absolute temperatures in 100 K.
     Radiation,
@@ -47,6 +49,8 @@ pub(crate) struct Argument {
 
 /// Temperature of a room, 20 degC, as in [`ArgumentForm::Radiation`].
 const ROOM: &str = "2.9315^4";
+/// Part of its range that an argument must go back for a reversal: noise of a sensor is less.
+const BACK: f64 = 0.1;
 /// Samples that quantiles are taken of.
 const SORTED: usize = 4000;
 
@@ -113,6 +117,28 @@ impl Argument {
         sizes.get(at.min(last)).copied().unwrap_or(0.0)
     }
 
+    /// Its median, to two digits of its spread: a number that people can read.
+    pub(crate) fn usual(&self) -> f64 {
+        let digit = 10f64.powf(self.spread().max(f64::MIN_POSITIVE).log10().floor() - 1.0);
+        let usual = (self.quantile(0.5) / digit).round() * digit;
+        // As it is written: without what the multiplication has added.
+        format!("{usual:.12e}").parse().unwrap_or(usual)
+    }
+
+    /// Whether it goes back by more than [`BACK`] of its range after it has gone up, and after it has gone down: what remembers the
+    /// way that it went shows only then.
+    pub(crate) fn reverses(&self) -> bool {
+        let (mut fall, mut rise) = (0.0_f64, 0.0_f64);
+        for values in &self.values {
+            let (mut highest, mut lowest) = (f64::NEG_INFINITY, f64::INFINITY);
+            for &v in values.iter().filter(|v| v.is_finite()) {
+                (highest, lowest) = (highest.max(v), lowest.min(v));
+                (fall, rise) = (fall.max(highest - v), rise.max(v - lowest));
+            }
+        }
+        fall.min(rise) > BACK * self.range()
+    }
+
     pub(crate) fn range(&self) -> f64 {
         self.quantile(1.0) - self.quantile(0.0)
     }
@@ -153,6 +179,7 @@ impl Argument {
     pub(crate) fn serves(&self, needs: Needs) -> bool {
         if self.form == ArgumentForm::Product
             || self.form == ArgumentForm::Radiation && needs != Needs::Radiation
+            || self.form == ArgumentForm::FromReference && needs != Needs::Difference
         {
             return false;
         }
@@ -162,11 +189,17 @@ impl Argument {
             Needs::BothSigns => both,
             Needs::Positive => self.quantile(0.0) >= 0.0,
             Needs::Radiation => self.form == ArgumentForm::Radiation,
-            Needs::Difference => self.form == ArgumentForm::Difference || self.is_difference,
+            Needs::Difference => {
+                let of_text = [ArgumentForm::Difference, ArgumentForm::FromReference];
+                of_text.contains(&self.form) || self.is_difference
+            }
             Needs::Stretch => self.position && self.serves(Needs::Difference),
             Needs::Angle => self.angle,
             Needs::Velocity => both && self.velocity,
-            Needs::Directed => both || self.serves(Needs::OneWay),
+            Needs::Directed => {
+                let turns = self.quantile(0.0) < 0.0 && self.quantile(1.0) > 0.0;
+                turns || self.serves(Needs::OneWay)
+            }
             Needs::OneWay => self.velocity && self.quantile(0.0) * self.quantile(1.0) > 0.0,
             Needs::OwnState => self.form == ArgumentForm::Variable && !self.held,
             Needs::Time => false,
@@ -233,6 +266,39 @@ fn difference_of(spec: &ModelSpec, a: VariableId, b: VariableId) -> Option<Varia
     let equation = spec.equations.iter().find(is)?;
     let variable = equation.unknown.variable();
     (spec.variable(variable).kind == VariableKind::Algebraic).then_some(variable)
+}
+
+/// Differences of variables and numbers or parameters that stand in the text, such as of a temperature and that of a room.
+fn from_references(spec: &ModelSpec, variables: &[VariableId]) -> Vec<Argument> {
+    let is_number = |id: ExpressionId| match spec.expressions.node(id) {
+        Node::Number(_) => true,
+        Node::Variable(v) => matches!(
+            spec.variable(v).kind,
+            VariableKind::Parameter | VariableKind::Constant
+        ),
+        _ => false,
+    };
+    let mut found: Vec<Argument> = Vec::new();
+    for node in spec.expressions.nodes() {
+        let &Node::Binary(Binary::Subtract, a, b) = node else {
+            continue;
+        };
+        let (variable, number) = match (spec.expressions.node(a), spec.expressions.node(b)) {
+            (Node::Variable(v), _) if is_number(b) => (v, b),
+            (_, Node::Variable(v)) if is_number(a) => (v, a),
+            _ => continue,
+        };
+        let span = spec.expressions.span(number);
+        let name = &spec.variable(variable).name;
+        let text = format!("({name} - {})", &spec.text[span.start..span.end]);
+        let known = found.iter().any(|f| f.expression == text);
+        if variables.contains(&variable) && !known {
+            let mut argument = Argument::new(spec, text, vec![variable]);
+            argument.form = ArgumentForm::FromReference;
+            found.push(argument);
+        }
+    }
+    found
 }
 
 /// The one variable that an expression is an affine function of, with coefficients made of parameters and numbers; `Some(None)`
@@ -310,6 +376,7 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
             }
         }
     }
+    found.extend(from_references(spec, &simple));
     // Bodies radiate to each other, and each to a room.
     let fourth = |v: VariableId| match spec.variable(v).unit_text.as_deref() {
         Some("K") => Some(format!("({}/100)^4", name(v))),
@@ -359,5 +426,57 @@ mod tests {
             "{names:?}"
         );
         assert!(!has("ocv"));
+    }
+
+    /// The argument `x` with these values in two recordings.
+    fn with_values(values: [Vec<f64>; 2]) -> Argument {
+        let spec = parse(
+            "model M input Real u; output Real y; Real x; equation der(x) = u; y = x; end M;",
+        )
+        .unwrap();
+        let mut x = arguments(&spec)
+            .into_iter()
+            .find(|a| a.expression == "x")
+            .unwrap();
+        x.set(values.to_vec(), values.to_vec());
+        x
+    }
+
+    #[test]
+    fn what_only_rises_does_not_reverse_and_noise_is_no_reversal() {
+        let rising = |k: i32| f64::from(k) + 0.5 * f64::from(k % 2);
+        let up: Vec<f64> = (0..20).map(rising).collect();
+        let down: Vec<f64> = up.iter().rev().copied().collect();
+        assert!(!with_values([up.clone(), up.clone()]).reverses());
+        // Between recordings nothing moves, but each may move in a way of its own.
+        let to_and_fro = [&up[..], &down[..]].concat();
+        assert!(with_values([up, to_and_fro]).reverses());
+    }
+
+    #[test]
+    fn a_usual_value_has_two_digits_of_the_spread() {
+        let warm: Vec<f64> = (0..101)
+            .map(|k| 318.4321 + 0.1 * f64::from(k - 50))
+            .collect();
+        assert_eq!(with_values([warm.clone(), warm]).usual(), 318.4);
+        assert_eq!(with_values([vec![5.0; 3], vec![5.0; 3]]).usual(), 5.0);
+    }
+
+    #[test]
+    fn differences_from_numbers_of_the_text_serve_as_differences() {
+        let spec = parse(
+            "model Block parameter Real Ta = 20; input Real P; output Real y; Real T; Real S;
+             equation der(T) = P - (T - 20); der(S) = Ta - S; y = T; end Block;",
+        )
+        .unwrap();
+        let all = arguments(&spec);
+        let of = |text: &str| all.iter().find(|a| a.expression == text);
+        for text in ["(T - 20)", "(S - Ta)"] {
+            let found = of(text).unwrap();
+            assert!(
+                found.serves(Needs::Difference) && !found.serves(Needs::Anything),
+                "{text}"
+            );
+        }
     }
 }

@@ -288,7 +288,14 @@ pub(crate) const TERMS: &[Term] = &[
             ),
         ],
     ),
-    curve("parameter_curve", Parameter, Anything, "{z}", &[]),
+    // About a usual value: the parameter itself stays what it is there, and within its bounds.
+    curve(
+        "parameter_curve",
+        Parameter,
+        Anything,
+        "({z} - {usual})",
+        &[],
+    ),
     curve("parameter_square", Parameter, Anything, "{z}^2", &[]),
     curve(
         "parameter_step",

@@ -34,7 +34,7 @@ pub(crate) enum Needs {
     Velocity,
     /// A velocity of one sign.
     OneWay,
-    /// What has a direction: both signs occur, or it is a velocity of one sign.
+    /// What has a direction: both signs occur, however rarely, or it is a velocity of one sign.
     Directed,
     /// The state whose derivative the equation determines.
     OwnState,
@@ -54,7 +54,7 @@ pub(crate) enum Starts {
     /// The same of sizes at which something snaps: what a recording says of them changes in jumps, and the screen looks between
     /// these for the best.
     Releases(&'static [f64]),
-    /// Parts of its inverse: wave numbers `2 pi n / range`.
+    /// Wave numbers with so many periods in the range of an angle, and more of whole ones.
     Waves(&'static [f64]),
     /// Parts of the recording's length.
     Length(&'static [f64]),
@@ -126,7 +126,7 @@ pub(crate) struct Term {
     pub(crate) port: Port,
     pub(crate) needs: Needs,
     /// Function of `{z}`, of the shapes, and of the memories; the strength is its factor. `{v}` is what stands at the place,
-    /// `{a}` the factor of the derivative there.
+    /// `{a}` the factor of the derivative there, `{usual}` a usual value of `{z}`.
     pub(crate) form: &'static str,
     pub(crate) memories: &'static [Memory],
     pub(crate) shapes: &'static [Shape],
@@ -136,6 +136,13 @@ pub(crate) struct Term {
     pub(crate) symbol: &'static str,
     /// Units of the parameters that it may enter; none: all.
     pub(crate) units: &'static [&'static str],
+}
+
+impl Term {
+    /// Whether it remembers the way that its argument went, as play and hysteresis do.
+    pub(crate) fn remembers_way(&self) -> bool {
+        self.memories.iter().any(|m| m.sampled)
+    }
 }
 
 pub(in crate::explain::engine) const fn shape(

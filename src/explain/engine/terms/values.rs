@@ -9,6 +9,11 @@ use crate::physics::{Excitation, Hold, Plant, parse};
 
 /// Error of a step of a term's memory: a score test needs no more.
 const TERM_ACCURACY: f64 = 1e-4;
+/// Teeth, poles and slots that machines have in a turn.
+const IN_A_TURN: [f64; 22] = [
+    1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 15.0, 16.0, 18.0, 20.0, 21.0,
+    24.0, 28.0, 30.0, 36.0, 48.0,
+];
 /// A memory that follows at once does so in a sample divided by this.
 const FAST: f64 = 5.0;
 
@@ -36,7 +41,7 @@ pub(in crate::explain::engine) fn starts(
         Starts::Travel(parts) => of(parts, &|a, p| p * a.travel(h)),
         Starts::Rate(parts) => of(parts, &|a, p| p * a.range() / h),
         Starts::RateSize(parts) => of(parts, &|a, p| p * a.rate_size(h)),
-        Starts::Waves(counts) => of(counts, &|_, n| n),
+        Starts::Waves(counts) => argument.map_or_else(Vec::new, |a| waves(counts, a, h)),
         Starts::Length(parts) => parts.iter().map(|p| p * samples as f64 * h).collect(),
         Starts::Instants(parts) => parts
             .iter()
@@ -50,6 +55,18 @@ pub(in crate::explain::engine) fn starts(
         Starts::Values(values) | Starts::Share(values) => values.to_vec(),
         Starts::Peaks => peaks.to_vec(),
     }
+}
+
+/// Wave numbers with so many periods in the range of an angle, and beyond these whole ones, as far as samples resolve them.
+fn waves(counts: &[f64], angle: &Argument, sample_time: f64) -> Vec<f64> {
+    const TURN: f64 = 2.0 * std::f64::consts::PI;
+    let in_range = counts.iter().map(|n| TURN * n / angle.range());
+    let most = in_range.clone().fold(0.0, f64::max);
+    let resolved = 0.5 * TURN / (sample_time * angle.rate_size(sample_time));
+    let whole = IN_A_TURN.iter().copied();
+    in_range
+        .chain(whole.filter(|k| (most..resolved).contains(k)))
+        .collect()
 }
 
 /// Mean time between values of the first output: the sample time, unless some are missing.
@@ -174,6 +191,7 @@ fn values_and_ends(
                 let form = instance.term.form;
                 filled(form, instance.term, argument, &memories, &shapes, h)
                     .replace("{v}", "0.0")
+                    .replace("{usual}", "0.0")
                     .replace("{a}", "1.0")
             };
             text.push_str(&format!("output Real b{i};\n"));
