@@ -1,6 +1,6 @@
 //! The time base: what is accepted, what is refused and where.
 
-use super::{fails, read, read_as};
+use super::{fails, read, read_as, roles};
 use crate::log::*;
 
 /// A recording with these time stamps.
@@ -183,4 +183,13 @@ fn a_given_sample_time_ignores_the_time_column() {
         (0.5, 0.0, 2)
     );
     assert_eq!(read_as("u,y\n1,2\n", &asked).unwrap().samples(), 1);
+}
+
+#[test]
+fn a_column_t_is_the_time_and_no_temperature() {
+    let csv = "t,u,T\n0,1,20\n1,1,21\n2,1,22\n";
+    let log = read_as(csv, &roles("u", "T")).unwrap();
+    assert_eq!((log.sample_time, log.output_data[0][2]), (1.0, 22.0));
+    let error = read_as("t,u,y\n0,1,20\n1,1,21\n", &roles("u", "T")).unwrap_err();
+    assert!(error.to_string().contains("no column `T`"), "{error}");
 }

@@ -5,11 +5,12 @@ const MOST_POINTS: f64 = 10_000.0;
 const MOST_POINTS_A_ROW: f64 = 20.0;
 /// Remainders below this part of the shortest spacing are rounding.
 const ROUNDING: f64 = 1e-4;
-/// Points to the shortest spacing where times have no common divisor: none is further from its point than a twentieth of it.
+/// Points to the shortest spacing where times have no common divisor: none is further from its point than a twentieth of it; or to the
+/// median, where a few times are much closer than the others.
 const POINTS_A_SPACING: f64 = 10.0;
 
 /// The greatest common divisor of the spacings of these times in seconds, or a tenth of the shortest where that needs too many
-/// points; none where both do. Times that go back begin another recording.
+/// points, or the shortest where it is a tenth of most; none where all need too many. Times that go back begin another recording.
 pub(crate) fn common_step(times: &[f64]) -> Option<f64> {
     let known: Vec<f64> = times.iter().copied().filter(|t| t.is_finite()).collect();
     let spacings: Vec<f64> = known
@@ -23,8 +24,12 @@ pub(crate) fn common_step(times: &[f64]) -> Option<f64> {
     let rounding = ROUNDING * shortest;
     let common = |a, b: &f64| divisor_of(a, *b, rounding);
     let divisor = spacings.iter().fold(0.0, common);
+    let mut sorted = spacings;
+    sorted.sort_by(f64::total_cmp);
+    let few_are_close = shortest <= sorted[sorted.len() / 2] / POINTS_A_SPACING;
     [divisor, shortest / POINTS_A_SPACING]
         .into_iter()
+        .chain(few_are_close.then_some(shortest))
         .find(|step| *step >= finest)
 }
 
@@ -62,5 +67,12 @@ mod tests {
             .collect();
         assert_eq!(common_step(&bursts), None);
         assert_eq!(common_step(&[1.0]), None);
+        // Two of the times are close to each other, and nothing divides all.
+        let mut one_pair: Vec<f64> = (0..40)
+            .map(|k| f64::from(k) * std::f64::consts::E)
+            .collect();
+        one_pair.insert(20, one_pair[19] + 0.02);
+        one_pair.push(150.0);
+        assert_eq!(common_step(&one_pair), Some(one_pair[20] - one_pair[19]));
     }
 }
