@@ -126,7 +126,7 @@ mod tests {
     fn with_errors(of: &Explanation, without: f64, with: f64, adequate: bool) -> Explanation {
         let mut e = of.clone();
         let mut steps = e.fit.train.clone();
-        steps.parameters_only.rmse = without;
+        (steps.simulation.rmse, steps.parameters_only.rmse) = (2.0 * without, without);
         steps.augmented.rmse = with;
         e.fit.heldout = Some(steps);
         e.remaining.adequate = adequate;

@@ -116,7 +116,7 @@ end Stack;
         "{}",
         said["summary"]
     );
-    assert_eq!(depends, ["T"]);
+    assert_eq!(depends, ["T", "R0"]);
     assert!((c + 0.006 * 0.105).abs() < 4.0 * std, "{c} +- {std}");
 }
 
@@ -192,17 +192,26 @@ fn a_gain_that_depends_on_the_position_is_found_in_a_stiff_plant() {
   parameter Real k(unit="N/m", min=1000, max=1900) = 1300;
   parameter Real d(unit="N.s/m", min=0.3, max=1.5) = 0.7;
   parameter Real Bl(unit="T.m", min=4.5, max=6.5) = 5.4;
+  final parameter Real m(unit="kg") = 0.012;
+  final parameter Real R(unit="Ohm") = 6;
+  final parameter Real L(unit="H") = 0.0005;
   input Real u(unit="V"); output Real yx(unit="m"); output Real yi(unit="A");
   Real x(unit="m"); Real v(unit="m/s"); Real i(unit="A");
 equation
   der(x) = v;
-  0.012*der(v) = Bl*i - k*x - d*v;
-  0.0005*der(i) = u - 6*i - Bl*v;
+  m*der(v) = Bl*i - k*x - d*v;
+  L*der(i) = u - R*i - Bl*v;
   yx = x; yi = i;
 end Speaker;
 "#;
-    let lines = "0.012*der(v) = Bl*i - k*x - d*v;\n  0.0005*der(i) = u - 6*i - Bl*v;";
-    let other = lines.replace("Bl*", "Bl*(1 - 1.1e4*x^2)*");
+    let lines = "equation
+  der(x) = v;
+  m*der(v) = Bl*i - k*x - d*v;
+  L*der(i) = u - R*i - Bl*v;";
+    let other = lines.replace("Bl*", "Bl*(1 - c*x^2)*").replace(
+        "equation",
+        "  final parameter Real c(unit=\"1/m2\") = 1.1e4;\nequation",
+    );
     let loud = levels(1, 6);
     let inputs = |k: usize| vec![9.0 * loud(k / 4)];
     let said = explained(
@@ -216,6 +225,6 @@ end Speaker;
     let (_, depends, c, std) = first(&said, "parameter_square_c");
     assert_eq!(said["verdict"], "named", "{}", said["summary"]);
     assert_eq!(said["effects"][0]["enters"], "Bl");
-    assert_eq!(depends, ["x"]);
+    assert_eq!(depends, ["x", "Bl"]);
     assert!((c + 1.1e4 * 5.6).abs() < 4.0 * std, "{c} +- {std}");
 }

@@ -61,6 +61,10 @@ pub(crate) fn explain_equations(
         ..PlantOptions::default()
     };
     let mut explanation = explain_plant(&found.plant, &logs, recordings, &options).ok()?;
+    // Nobody has written a text of these equations.
+    for line in &mut explanation.summary {
+        *line = line.replace("the text", "the simulation");
+    }
     explanation.summary.push(format!(
         "The simulated outputs follow equations with {}, to {:.2} % of what the recording differs by; this answer is about these equations.",
         counted(found.plant.spec.states().len(), "state"),

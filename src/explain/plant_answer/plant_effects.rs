@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::DMatrix;
+
 use super::Answer;
 use super::formula_in_numbers::{in_numbers, with_short_literals};
 use crate::explain::document::sentences::{number, quantity};
@@ -20,6 +22,8 @@ const LAW_POINTS: usize = 41;
 /// Parameters of an effect that the summary lists.
 const MOST_ESTIMATES: usize = 6;
 /// Points of a curve that it lists.
+/// Of a curve whose shape is known so many times better than its values, the deviations of the shape are said.
+const MOSTLY_LINE: f64 = 0.5;
 const MOST_POINTS: usize = 12;
 /// Step of the differences that give a law's slopes, as a part of a parameter.
 const DIFFERENCE: f64 = 1e-4;
@@ -153,15 +157,25 @@ impl Answer<'_> {
             all.extend(effect.parameters.get(name).map(|q| (name, q)));
         }
         if let Some(curve) = &fitted.lead.curve {
-            let points: Vec<(f64, &Quantity)> = curve
-                .knots
-                .iter()
-                .copied()
-                .zip(all.iter().map(|(_, q)| *q))
-                .collect();
-            return curve_in_numbers(&fitted.argument, &points)
+            let mut values: Vec<Quantity> = all.iter().map(|(_, q)| (*q).clone()).collect();
+            let numbers: Vec<usize> = self.parameters_of(fitted).map(|(_, at)| at).collect();
+            let covariance = DMatrix::from_fn(numbers.len(), numbers.len(), |i, j| {
+                self.within_bounds[(numbers[i], numbers[j])]
+            });
+            let shape = beside_a_line(&curve.knots, &covariance);
+            if let Some(shape) = &shape {
+                let each = values.iter_mut().zip(shape);
+                each.for_each(|(value, std)| value.std = Some(*std));
+            }
+            let points: Vec<(f64, &Quantity)> = curve.knots.iter().copied().zip(&values).collect();
+            let mut lines: Vec<String> = curve_in_numbers(&fitted.argument, &points)
                 .into_iter()
                 .collect();
+            lines.extend(shape.map(|_| {
+                "These deviations are those of its shape: what is a straight line in it, parameters of the equations do as well."
+                    .to_owned()
+            }));
+            return lines;
         }
         if !(1..=MOST_ESTIMATES).contains(&all.len()) {
             return vec![];
@@ -369,6 +383,28 @@ fn period(frequency: &Quantity) -> Quantity {
     }
 }
 
+/// Standard deviations of the values of a curve beside a straight line through them, where most of what is not known is that line.
+fn beside_a_line(knots: &[f64], covariance: &DMatrix<f64>) -> Option<Vec<f64>> {
+    let m = knots.len();
+    if covariance.nrows() != m || m <= 2 || covariance.iter().any(|c| !c.is_finite()) {
+        return None;
+    }
+    let (first, range) = (knots[0], knots[m - 1] - knots[0]);
+    let line = DMatrix::from_fn(m, 2, |i, j| [1.0, (knots[i] - first) / range][j]);
+    let normal = (line.transpose() * &line).try_inverse()?;
+    let off = DMatrix::identity(m, m) - &line * normal * line.transpose();
+    let shape = &off * covariance * off.transpose();
+    let std = |of: &DMatrix<f64>| -> Vec<f64> {
+        of.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect()
+    };
+    let (whole, shape) = (std(covariance), std(&shape));
+    let mostly = whole
+        .iter()
+        .zip(&shape)
+        .all(|(whole, shape)| *shape < MOSTLY_LINE * whole);
+    mostly.then_some(shape)
+}
+
 /// A curve at its knots, or at some of many.
 fn curve_in_numbers(argument: &str, points: &[(f64, &Quantity)]) -> Option<String> {
     let last = points.len().checked_sub(1)?;
@@ -406,6 +442,19 @@ mod tests {
             std: Some(std),
             unit: unit.to_owned(),
         }
+    }
+
+    #[test]
+    fn a_curve_beside_a_line_that_parameters_do_is_known_better_than_its_values() {
+        let knots = [0.0, 1.0, 2.0, 4.0];
+        let own = |i: usize, j: usize| if i == j { 0.01 } else { 0.0 };
+        let shared = |i: usize, j: usize| 1.0 + 0.3 * knots[i] * knots[j];
+        let both = DMatrix::from_fn(4, 4, |i, j| own(i, j) + shared(i, j));
+        let shape = beside_a_line(&knots, &both).unwrap();
+        // What is left of independent values: less than each of them has.
+        assert!(shape.iter().all(|s| *s < 0.1), "{shape:?}");
+        // Nothing is shared: the values are what is known.
+        assert_eq!(beside_a_line(&knots, &DMatrix::from_fn(4, 4, own)), None);
     }
 
     #[test]

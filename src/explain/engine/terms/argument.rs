@@ -119,8 +119,12 @@ impl Argument {
 
     /// Its median, to two digits of its spread: a number that people can read.
     pub(crate) fn usual(&self) -> f64 {
-        let digit = 10f64.powf(self.spread().max(f64::MIN_POSITIVE).log10().floor() - 1.0);
-        let usual = (self.quantile(0.5) / digit).round() * digit;
+        let (middle, spread) = (self.quantile(0.5), self.spread());
+        if spread <= 0.0 {
+            return middle;
+        }
+        let digit = 10f64.powf(spread.log10().floor() - 1.0);
+        let usual = (middle / digit).round() * digit;
         // As it is written: without what the multiplication has added.
         format!("{usual:.12e}").parse().unwrap_or(usual)
     }

@@ -1,20 +1,21 @@
 //! How sure an answer about a plant is.
 
-use crate::explain::engine::select::CHANCE;
+use crate::explain::engine::thresholds::LEFT;
 use crate::explain::explanation::Verdict;
 
 /// How often answers like this one were right, by what tells most: how many effects are named, and whether score tests find
-/// structure beside them. Counted on 60 recordings of 23 classes of plants (`benches/physics_cases.py --seed 5` and `--seed 6`, the
-/// first 30 of each; the check on others stands in `docs/accuracy.md`), with one right and one wrong answer added to each group.
-/// Without a name it is the probability that something is missing, or that nothing is.
+/// structure beside them. Single names without that were counted on 60 recordings of 23 classes of plants (`benches/physics_cases.py
+/// --seed 5` and `--seed 6`, the first 30 of each), the others on 106 recordings of 55 classes, of which 20 are real, before a change that
+/// was made after them; one right and one wrong answer are added to each group. `docs/accuracy.md` has the check. Without a name it is
+/// the probability that something is missing, or that nothing is.
 pub(in crate::explain::plant_answer) fn probability(
     verdict: Verdict,
     effects: usize,
     p_value: f64,
 ) -> f64 {
     let (right, all) = match verdict {
-        Verdict::Named | Verdict::Family if effects > 1 => (2, 6),
-        Verdict::Named | Verdict::Family if p_value < CHANCE => (5, 8),
+        Verdict::Named | Verdict::Family if effects > 1 => (5, 10),
+        Verdict::Named | Verdict::Family if p_value < LEFT => (14, 23),
         Verdict::Named | Verdict::Family => (27, 31),
         Verdict::Unexplained => (4, 4),
         Verdict::Consistent | Verdict::Parameters => (10, 11),
