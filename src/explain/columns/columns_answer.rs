@@ -79,7 +79,11 @@ pub(crate) fn explain_equations(
 
 /// Takes a name back that explains less of every output than the equations miss of it: what they miss of the simulation, they may lack
 /// in the recording too. Nothing is missing surely where what other parameters leave is less than that.
-fn doubt_below_remainder(explanation: &mut Explanation, found: &Reproduced, checked: &Checked) {
+pub(super) fn doubt_below_remainder(
+    explanation: &mut Explanation,
+    found: &Reproduced,
+    checked: &Checked,
+) {
     let left = |steps: &FitSteps| steps.parameters_only.rmse.powi(2);
     let explained = |steps: &FitSteps| left(steps) - steps.augmented.rmse.powi(2);
     if explanation.verdict != Verdict::Named || found.exceeded(explanation, checked, &explained) {

@@ -4,6 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
+use super::columns_answer::doubt_below_remainder;
 use super::*;
 use crate::explain::linear::check::Checked;
 use crate::explain::simulation::Simulation;
@@ -186,6 +187,30 @@ fn what_acts_in_the_recording_is_named_and_a_changed_parameter_is_not() {
     assert!(plant.simulation.unwrap().contains("sin(y_state)"));
     let softer = answer(&|p| p.parameters[1] = 8.0);
     assert_eq!(softer.verdict, Verdict::Parameters, "{:?}", softer.summary);
+}
+
+#[test]
+fn a_name_that_explains_less_than_the_equations_miss_is_taken_back() {
+    let (recorded, simulated) = differing(&|p| p.parameters[2] = 0.3);
+    let known = Simulation::Outputs(vec![simulated]);
+    let checked = Checked::new(&[recorded], &known, &|_| true);
+    let mut found = equations(&checked).unwrap();
+    let named = explain_equations(&found, &checked, &[]).unwrap();
+    let steps = &named.fit.train;
+    let (left, kept) = (steps.parameters_only.rmse, steps.augmented.rmse);
+    let mut judged = |missed: f64| {
+        found.remainder = vec![vec![missed; SAMPLES]];
+        let mut explanation = named.clone();
+        doubt_below_remainder(&mut explanation, &found, &checked);
+        explanation.verdict
+    };
+    assert_eq!(judged(0.5 * left), Verdict::Named);
+    // More than was explained, and less than other parameters leave.
+    assert_eq!(
+        judged((left * left - 0.5 * kept * kept).sqrt()),
+        Verdict::Unexplained
+    );
+    assert_eq!(judged(2.0 * left), Verdict::Parameters);
 }
 
 /// A recording with a sensor that lags behind a pendulum by 0.12 s.
