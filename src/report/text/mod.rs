@@ -21,7 +21,9 @@ pub(crate) use model::{
     test_tables, too_short,
 };
 #[cfg(feature = "report")]
-pub(crate) use number::{percent, significant};
+pub(crate) use number::percent;
+#[cfg(feature = "cli")]
+pub(crate) use number::significant;
 #[cfg(feature = "cli")]
 pub(crate) use plant::linearisation_text;
 #[cfg(feature = "report")]
