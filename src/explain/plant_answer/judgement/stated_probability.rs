@@ -5,8 +5,8 @@ use crate::explain::explanation::Verdict;
 
 /// How often answers like this one were right, by what tells most: how many effects are named, and whether score tests find
 /// structure beside them. Single names without that were counted on 60 recordings of 23 classes of plants (`benches/physics_cases.py
-/// --seed 5` and `--seed 6`, the first 30 of each), the others on 106 recordings of 55 classes, of which 20 are real, before a change that
-/// was made after them; one right and one wrong answer are added to each group. `docs/accuracy.md` has the check. Without a name it is
+/// --seed 5` and `--seed 6`, the first 30 of each), the others on 106 recordings of 55 classes, of which 20 are real and 44 the developers' own,
+/// which these counts favour; one right and one wrong answer are added to each group. `docs/accuracy.md` has the check. Without a name it is
 /// the probability that something is missing, or that nothing is.
 pub(in crate::explain::plant_answer) fn probability(
     verdict: Verdict,
