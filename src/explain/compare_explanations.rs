@@ -59,15 +59,28 @@ pub(crate) fn doubt(explanation: &mut Explanation) {
         return;
     }
     let removed = removed(explanation);
-    let said = if removed > 0.0 && (removed >= MOST || !explanation.remaining.adequate) {
-        explanation.verdict = Verdict::Unexplained;
-        "Something is left out, and the following is not sure, because other parameters of the simulator may look like it."
+    if removed > 0.0 && (removed >= MOST || !explanation.remaining.adequate) {
+        take_back(
+            explanation,
+            Verdict::Unexplained,
+            "Something is left out, and the following is not sure, because other parameters of the simulator may look like it.",
+        );
     } else {
-        explanation.verdict = Verdict::Parameters;
+        take_back(
+            explanation,
+            Verdict::Parameters,
+            "Nothing is surely left out: beside other parameters, the following takes less than half of the mean square off blocks of the recording that were not fitted.",
+        );
+    }
+}
+
+/// Puts another verdict in the place of a name, with the reason first. Where nothing is surely left out, no effects are listed.
+pub(crate) fn take_back(explanation: &mut Explanation, verdict: Verdict, reason: &str) {
+    if verdict == Verdict::Parameters {
         explanation.effects.clear();
-        "Nothing is surely left out: beside other parameters, the following takes less than half of the mean square off blocks of the recording that were not fitted."
-    };
-    explanation.summary.insert(0, said.to_owned());
+    }
+    explanation.verdict = verdict;
+    explanation.summary.insert(0, reason.to_owned());
 }
 
 /// Error of one explanation's run over that of another, the geometric mean over recordings and outputs; none where they show

@@ -8,6 +8,7 @@ mod colour;
 mod effective;
 mod estimate;
 mod feedback;
+mod switching;
 
 use statrs::function::gamma::ln_gamma;
 
@@ -15,6 +16,7 @@ pub(crate) use self::colour::Colour;
 pub(crate) use self::effective::effective_samples;
 pub(crate) use self::estimate::Colours;
 pub(crate) use self::feedback::inputs_foretold;
+pub(crate) use self::switching::inputs_switched;
 
 /// Degrees of freedom that are tried; infinity is Gaussian.
 const DEGREES: [f64; 6] = [3.0, 4.0, 6.0, 10.0, 20.0, f64::INFINITY];

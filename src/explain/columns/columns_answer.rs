@@ -1,7 +1,7 @@
 //! The answer where a simulation is known by its outputs, and equations reproduce them.
 
 use super::{Question, Reproduced, USEFUL, reproduce};
-use crate::explain::compare_explanations::doubt;
+use crate::explain::compare_explanations::{doubt, take_back};
 use crate::explain::engine::terms::documentation::plant_effect;
 use crate::explain::explanation::{Explanation, FitSteps, Verdict};
 use crate::explain::linear::check::Checked;
@@ -89,15 +89,19 @@ pub(super) fn doubt_below_remainder(
     if explanation.verdict != Verdict::Named || found.exceeded(explanation, checked, &explained) {
         return;
     }
-    let said = if found.exceeded(explanation, checked, &left) {
-        explanation.verdict = Verdict::Unexplained;
-        "The following is not sure: it explains less of the recording than the equations miss of the simulated outputs."
+    if found.exceeded(explanation, checked, &left) {
+        take_back(
+            explanation,
+            Verdict::Unexplained,
+            "The following is not sure: it explains less of the recording than the equations miss of the simulated outputs.",
+        );
     } else {
-        explanation.verdict = Verdict::Parameters;
-        explanation.effects.clear();
-        "Nothing is surely left out: other parameters leave less of the recording than the equations miss of the simulated outputs."
-    };
-    explanation.summary.insert(0, said.to_owned());
+        take_back(
+            explanation,
+            Verdict::Parameters,
+            "Nothing is surely left out: other parameters leave less of the recording than the equations miss of the simulated outputs.",
+        );
+    }
 }
 
 /// What equations leave that reproduce the columns roughly may be their own error, and a name beside it stand for that: unless it is less

@@ -1,9 +1,10 @@
 //! How well free runs follow the recordings in blocks that their fit has not seen.
 
 use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::explain::engine::thresholds::{FOLLOWS, MOST_STEPS, limited};
-use crate::noise::Series;
+use crate::noise::{Series, effective_samples};
 use crate::physics::estimate::{Effort, EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, Plant};
 
@@ -17,6 +18,8 @@ pub(crate) const EXPLAINED: f64 = 0.5;
 const VERY_GOOD: f64 = 0.75;
 /// One that does not take more than this part off is unsatisfactory (the same).
 pub(crate) const SATISFACTORY: f64 = 0.5;
+/// Level of the test that errors are smaller than others.
+const SMALLER: f64 = 0.05;
 /// Errors of this many standard deviations and more are those of a run that leaves the recording.
 const STAYS: f64 = 10.0;
 /// Effort of a fit from that to all of the recordings.
@@ -44,6 +47,8 @@ pub(crate) struct HeldOut {
     pub(crate) squares: Vec<f64>,
     /// Variance of each output.
     pub(crate) variances: Vec<f64>,
+    /// Errors of each output, in all blocks of all recordings; none where nothing was measured.
+    pub(crate) errors: Vec<Vec<f64>>,
 }
 
 impl HeldOut {
@@ -64,10 +69,28 @@ impl HeldOut {
         1.0 - self.over(other).powi(2)
     }
 
-    /// Whether more than half of the mean square of another is gone in every output.
-    pub(crate) fn explains_every_output(&self, other: &Self) -> bool {
-        let mut outputs = self.squares.iter().zip(&other.squares);
-        outputs.all(|(own, other)| *own <= EXPLAINED * other)
+    /// Probability by chance that errors of an output are so much smaller than those of another, in mean square: a t-test of the
+    /// differences of squares, with as many of them as are independent (F. X. Diebold and R. S. Mariano, *J. Bus. Econ. Stat.* 13, 1995).
+    fn chance_of_output(&self, other: &Self, output: usize) -> f64 {
+        let pairs = self.errors[output].iter().zip(&other.errors[output]);
+        let smaller: Vec<f64> = pairs.map(|(own, other)| other * other - own * own).collect();
+        let known = || smaller.iter().filter(|d| d.is_finite());
+        let count = known().count().max(1) as f64;
+        let mean = known().sum::<f64>() / count;
+        let variance = known().map(|d| (d - mean).powi(2)).sum::<f64>() / count;
+        let keep = smaller.iter().map(|d| d.is_finite()).collect();
+        let independent = effective_samples(&vec![smaller], &vec![keep]);
+        let freedom = (independent - 1.0).max(1.0);
+        let t = mean / (variance / freedom).sqrt().max(f64::MIN_POSITIVE);
+        StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| law.sf(t))
+    }
+
+    /// Whether errors of some output are smaller than those of another by more than chance, and those of none larger.
+    pub(crate) fn surely_smaller(&self, other: &Self) -> bool {
+        let chances: Vec<f64> = (0..self.errors.len())
+            .map(|o| self.chance_of_output(other, o))
+            .collect();
+        chances.iter().any(|p| *p < SMALLER) && chances.iter().all(|p| *p <= 1.0 - SMALLER)
     }
 
     /// Whether free runs follow the recordings clearly better than their means do.
@@ -294,10 +317,17 @@ pub(super) fn held_out(
         let (sum, count) = of_output(o, &recorded, mean);
         variances.push(sum / count);
     }
-    squares
-        .iter()
-        .all(|s| s.is_finite())
-        .then_some(HeldOut { squares, variances })
+    // A fold holds the recordings that it leaves something out of, in their order.
+    let errors_of = |o: usize| -> Vec<f64> {
+        let each = (0..recordings.len()).flat_map(|r| folds.iter().map(move |f| (f, r)));
+        let columns = each.filter_map(|(f, r)| f.get(r * outputs + o));
+        columns.flatten().copied().collect()
+    };
+    squares.iter().all(|s| s.is_finite()).then(|| HeldOut {
+        squares,
+        variances,
+        errors: (0..outputs).map(errors_of).collect(),
+    })
 }
 
 #[cfg(test)]
@@ -325,6 +355,39 @@ mod tests {
         let ends = |fold| block(&of(&y), fold);
         assert_eq!([ends(0), ends(1), ends(2)], [0..3, 3..9, 9..100]);
         assert_eq!(of(&y).first_part(2.0 / 3.0), 9);
+    }
+
+    /// Under slow errors a small difference of their mean squares is chance, under white ones it is not.
+    #[test]
+    fn slow_errors_are_few() {
+        let mut state = 3u64;
+        let mut noise = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 33) as f64 / f64::from(1u32 << 31) - 0.5
+        };
+        let mut judged = |memory: f64, smaller: f64| {
+            let mut runs = |size: f64| {
+                let mut x = 0.0;
+                let each = (0..600).map(|_| {
+                    x = memory * x + noise();
+                    size * x
+                });
+                let errors = vec![each.collect::<Vec<f64>>()];
+                HeldOut {
+                    squares: vec![1.0],
+                    variances: vec![1.0],
+                    errors,
+                }
+            };
+            let (own, other) = (runs(smaller), runs(1.0));
+            [own.surely_smaller(&other), other.surely_smaller(&own)]
+        };
+        assert_eq!(judged(0.0, 0.8), [true, false]);
+        assert_eq!(judged(0.99, 0.8), [false, false]);
+        assert_eq!(judged(0.9, 0.3), [true, false]);
+        assert_eq!(judged(0.0, 1.0), [false, false]);
     }
 
     fn of(y: &[f64]) -> PlantRecording {

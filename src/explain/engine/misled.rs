@@ -7,7 +7,7 @@
 //! A plant that integrates adds up what disturbs it. Its free run leaves a random walk, and of two such series one seems to explain
 //! the other (C. W. J. Granger and P. Newbold, *J. Econometrics* 2, 1974).
 
-use crate::noise::inputs_foretold;
+use crate::noise::{inputs_foretold, inputs_switched};
 use crate::physics::estimate::{Fit, PlantRecording, Study};
 use crate::physics::{Hold, Plant};
 
@@ -70,6 +70,14 @@ pub(super) fn reacting_inputs(
     let innovations = fit.noise.whiten(&residual, study.mask());
     let inputs: Vec<&[Vec<f64>]> = recordings.iter().map(|r| &r.inputs[..]).collect();
     // What the input is between samples acts on the output that ends them, unless it is held.
-    let simulated = (hold == Hold::Zero).then(|| study.free_run(fit)).flatten();
-    inputs_foretold(&innovations, study.mask(), &inputs, simulated.as_ref())
+    let simulated = study.free_run(fit);
+    let at_once = simulated.as_ref().filter(|_| hold == Hold::Zero);
+    let mut reacting = inputs_foretold(&innovations, study.mask(), &inputs, at_once);
+    if let Some(simulated) = &simulated {
+        let recorded = recordings.iter().flat_map(|r| r.outputs.clone()).collect();
+        reacting.extend(inputs_switched(&recorded, simulated, study.mask(), &inputs));
+        reacting.sort_unstable();
+        reacting.dedup();
+    }
+    reacting
 }

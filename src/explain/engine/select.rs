@@ -230,18 +230,21 @@ fn explains(rival: &Rival, other: Option<&Rival>) -> bool {
 
 /// Of the fits of one plant the likelihood's, whose standard deviations hold, unless it simulates worse, in blocks left out or
 /// by more than its noise allows. Least squares stands for it, unless the values of the text simulate better in blocks left out.
-/// A plant to which nothing is added is there to be simulated: of equals least squares comes first.
+/// A plant to which nothing is added is there to be simulated: least squares comes first, unless another is better in blocks left
+/// out by more than chance.
 fn trusted<'a>(rivals: &[&'a Rival], judged: bool) -> Option<&'a Rival> {
     let least = *rivals.iter().min_by(|a, b| order(a, b))?;
     let follows = |r: &Rival| !judged || r.held_out.over(&least.held_out) <= 1.0 + EQUAL;
     let likelihood = |r: &&&Rival| {
-        let as_good = r.accepted > 0 || least.estimator != Estimator::FreeRun;
-        r.estimator == Estimator::Likelihood
-            && follows(r)
-            && (!judged || as_good && !r.misspecified)
+        r.estimator == Estimator::Likelihood && follows(r) && !(judged && r.misspecified)
     };
     let free_run = |r: &&&Rival| r.estimator == Estimator::FreeRun && follows(r);
-    let chosen = rivals.iter().find(likelihood);
+    let simulates = |r: &&&Rival| {
+        let without = judged && r.accepted == 0 && r.estimator == Estimator::FreeRun;
+        without && !least.held_out.surely_smaller(&r.held_out)
+    };
+    let chosen = rivals.iter().find(simulates);
+    let chosen = chosen.or_else(|| rivals.iter().find(likelihood));
     let chosen = chosen.or_else(|| rivals.iter().find(free_run));
     Some(chosen.copied().unwrap_or(least))
 }
@@ -444,6 +447,7 @@ mod tests {
             held_out: HeldOut {
                 squares: vec![1.0],
                 variances: vec![2.0],
+                errors: vec![],
             },
             whole,
             misspecified,

@@ -168,14 +168,14 @@ impl Answer<'_> {
         // Of a plant that follows worse than the mean most terms take half the error: what is found must follow. A plant that
         // does not run freely has no blocks that say so, and they prove no function of an input that reacts to disturbances.
         let feedback = self.depends_on_feedback();
-        let (follows, explains, relied_on) = match &self.found.held_out {
+        let (follows, explains, better) = match &self.found.held_out {
             None => (true, false, true),
-            Some([without, with]) if feedback => (true, false, with.explains_every_output(without)),
+            Some([without, with]) if feedback => (true, false, with.surely_smaller(without)),
             Some([without, with]) => {
                 let closely = with.follows_closely();
                 let removes = with.removed(without) >= EXPLAINED;
-                let every = with.explains_every_output(without);
-                (without.follows() || closely, removes && closely, every)
+                let better = with.surely_smaller(without);
+                (without.follows() || closely, removes && closely, better)
             }
         };
         let effects: Vec<EffectFound> = self
@@ -183,12 +183,16 @@ impl Answer<'_> {
             .enumerate()
             .filter_map(|(i, fitted)| self.effect(i, fitted))
             .collect();
-        // Where structure is left, a name is given only to what explains more of blocks left out than it leaves, and leaves
-        // little. A curve that leaves structure may follow what enters elsewhere; a term with a name of its own claims more.
+        // Where a test finds structure, a name must make blocks left out better by more than chance. Where much is left, a name is
+        // given only to what explains more of them than it leaves, and leaves little: a curve may follow what enters elsewhere; a
+        // term with a name of its own claims more.
         let curves = effects.iter().any(|e| e.effect == "law");
-        let sure = (gain >= SURE || best.is_some_and(|b| b.proved))
+        // Blocks alone prove a name only where no test finds structure beside it.
+        let proved = p_value >= LEFT && best.is_some_and(|b| b.proved);
+        let sure = (gain >= SURE || proved)
             && follows
             && self.effects().all(|fitted| self.is_significant(fitted))
+            && (p_value >= LEFT || better)
             && (adequate || explains && !curves);
         let runs = self.free_runs();
         let l = self.base.outputs();
@@ -265,8 +269,8 @@ impl Answer<'_> {
             astray,
             refused,
         });
-        // What is not sure predicts a fresh recording only where it has explained blocks left out, in every output.
-        let relied_on = verdict != Verdict::Unexplained || effects.is_empty() || relied_on;
+        // What is not sure predicts a fresh recording only where it makes blocks left out better by more than chance.
+        let relied_on = verdict != Verdict::Unexplained || effects.is_empty() || better;
         if !relied_on {
             summary.push(
                 "It is not sure enough to predict with: `simulate` uses the equations without it."

@@ -65,7 +65,7 @@ impl Answer<'_> {
                 lines.extend(first.filter(|f| f.gain < SURE).map(|f| {
                     format!(
                         "By BIC alone it would not be named (gain {}, needed {}): it takes more than half of the mean square off \
-                         held-out blocks, and no other function does as well.",
+                         held-out blocks, and no other function takes as much off them.",
                         number(f.gain),
                         number(SURE)
                     )
