@@ -1,6 +1,6 @@
 //! Simulated outputs on the samples of the recording that they belong to, by time.
 
-use crate::log::{Log, Origin, Reading};
+use crate::log::{Log, Reading};
 
 /// How far a sample of the simulation may be from one of the recording, in samples, and still be taken as it is.
 const SAME_TIME: f64 = 0.01;
@@ -128,9 +128,8 @@ fn name(reading: &Reading) -> String {
 /// to the start of a recording with dates.
 fn shift(recording: &Reading, simulated: &Reading) -> (f64, Vec<String>) {
     let start = |reading: &Reading| reading.logs.first().map_or(0.0, |log| log.start_time);
-    let nanoseconds = |origin: &Origin| origin.nanoseconds;
     match (&recording.origin, &simulated.origin) {
-        (Some(a), Some(b)) => ((nanoseconds(b) - nanoseconds(a)) as f64 * 1e-9, Vec::new()),
+        (Some(a), Some(b)) => (b.since(a), Vec::new()),
         (None, None) => (0.0, Vec::new()),
         _ => (
             start(recording) - start(simulated),

@@ -192,17 +192,28 @@ pub(crate) fn kept_missing(roles: Roles) -> Roles {
     Roles { missing, ..roles }
 }
 
-/// Reads recordings with these columns; one with gaps is several.
+/// Reads recordings with these columns; one with gaps is several. Where all have dates, time counts from the first of the first.
 pub(crate) fn read_with(
     roles: &Roles,
     sources: &[Source],
     need: RoleNeed,
     say: Verbosity,
 ) -> anyhow::Result<(Vec<Log>, Vec<Recording>)> {
-    let (mut logs, mut recordings) = (Vec::new(), Vec::new());
+    let mut readings = Vec::new();
     for source in sources {
         let reading = Reading::read(source, roles, need)?;
         tell_reading(&source.to_string(), reading.said.as_deref(), say);
+        readings.push(reading);
+    }
+    let first = readings.first().and_then(|r| r.origin);
+    let first = first.filter(|_| readings.iter().all(|r| r.origin.is_some()));
+    let (mut logs, mut recordings) = (Vec::new(), Vec::new());
+    for mut reading in readings {
+        if let (Some(origin), Some(first)) = (reading.origin, first) {
+            let later = origin.since(&first);
+            reading.logs.iter_mut().for_each(|l| l.start_time += later);
+            reading.origin = Some(first);
+        }
         for log in &reading.logs {
             recordings.push(Recording {
                 name: log.name.clone(),

@@ -11,7 +11,8 @@ use crate::cli::flags::RoleFlags;
 use crate::cli::terminal::note;
 use crate::cli::{Outcome, Verbosity};
 use crate::explain::{AugmentedPlant, EffectFound};
-use crate::log::{Channel, Log, RoleNeed, Roles, Source, write_table};
+use crate::identify::Recording;
+use crate::log::{Channel, Log, Origin, RoleNeed, Roles, Source, write_table};
 use crate::physics::estimate::{PlantRecording, start_by_least_squares};
 use crate::physics::{Hold, Plant, Point, Trajectory, VariableId};
 use crate::report::{PlantDocument, is_plant, significant};
@@ -74,7 +75,7 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
     let source = std::slice::from_ref(asked.input);
     let of =
         |names: &Channels| read_channels(&plant, (&columns, names), source, asked.roles, need, say);
-    let (mut logs, _) = match (&remembered, of(&columns)) {
+    let (mut logs, read) = match (&remembered, of(&columns)) {
         (Some(names), Err(error)) if error.is::<OtherNames>() && !asked.roles.names_columns() => {
             of(names).map_err(|other| match other.is::<OtherNames>() {
                 true => error,
@@ -90,6 +91,13 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         );
     }
     let mut log = logs.remove(0);
+    let start_time = log.start_time;
+    let known = match (&document, &explanation) {
+        (Some(document), _) => &document.recordings[..],
+        (_, Some(explanation)) => &explanation.recordings[..],
+        _ => &[],
+    };
+    log.start_time += later(known, &read).unwrap_or(0.0);
     let simulated = match (asked.simulation, found) {
         (Some(file), Some(found)) => Some(simulated(found, file, asked.roles, say)?),
         _ => None,
@@ -163,8 +171,15 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         .iter()
         .zip(outputs.iter().map(Vec::as_slice))
         .collect();
-    write_table(asked.output, log.sample_time, log.start_time, &columns)?;
+    write_table(asked.output, log.sample_time, start_time, &columns)?;
     Ok(Outcome::Done)
+}
+
+/// Seconds by which time zero of a recording is later than that of those that a plant was fitted to; none where not all have dates. What
+/// repeats every day, or has changed, depends on the date.
+fn later(fitted: &[Recording], read: &[Recording]) -> Option<f64> {
+    let origin = |of: &[Recording]| Origin::parse(of.first()?.origin.as_ref()?);
+    Some(origin(read)?.since(&origin(fitted)?))
 }
 
 /// The names of the columns that were explained, for those of the plant; none where they are the same.

@@ -11,6 +11,8 @@ use crate::physics::{Hold, Plant};
 const SEARCHED: usize = 5000;
 /// Recordings with up to this part more are searched whole.
 const LITTLE_MORE: f64 = 0.25;
+/// Where few samples were measured, they are searched whole, with up to so many times more between them.
+const MOST_BETWEEN: usize = 5;
 /// What samples between those that are kept would add must be less than this part: of the variance of an input, and of the
 /// mean square of what the simulation leaves.
 const NEGLIGIBLE: f64 = 0.01;
@@ -44,7 +46,9 @@ impl Part {
 /// each in which the outputs go furthest. None where recordings are short.
 pub(crate) fn part(plant: &Plant, recordings: &[PlantRecording], hold: Hold) -> Option<Part> {
     let all: usize = recordings.iter().map(PlantRecording::samples).sum();
-    if all as f64 <= (1.0 + LITTLE_MORE) * SEARCHED as f64 {
+    let measured: usize = recordings.iter().map(|r| r.measured().len()).sum();
+    let little = |samples: usize| samples as f64 <= (1.0 + LITTLE_MORE) * SEARCHED as f64;
+    if little(all) || little(measured) && all <= MOST_BETWEEN * SEARCHED {
         return None;
     }
     let every = all.div_ceil(SEARCHED);

@@ -13,10 +13,10 @@ use super::screening::along::range_along;
 use super::step::{Stage, Step, improved, step};
 use super::terms::names::named;
 use super::terms::term::Needs;
-use super::thresholds::{BETTER_FITS, FINISHED, MOST, NEEDED, SECOND};
+use super::thresholds::{BETTER_FITS, FINISHED, LEFT, MOST, NEEDED, SECOND, SURE, chance};
 use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{EstimateError, EstimateOptions, Fit, Form, PlantRecording, Study};
-use crate::physics::{Hold, Plant};
+use crate::physics::{Hold, ModelSpec, Plant};
 
 /// What the search has found.
 #[derive(Clone)]
@@ -165,6 +165,25 @@ fn judge_by_blocks(
     fitted[..=first].rotate_right(1);
 }
 
+/// A term with a name in the place of a curve, of the same variables, that leaves structure: neither is the whole truth then, and of
+/// many values the criterion is for more numbers. The curve stays only where it is better in blocks left out by more than chance.
+fn named_for_curve(
+    spec: &ModelSpec,
+    step: &[Fitted],
+    estimator: Estimator,
+    recordings: &[PlantRecording],
+    hold: Hold,
+) -> Option<Fitted> {
+    let curve = step.first().filter(|f| f.lead.curve.is_some())?;
+    let term = step.iter().find(|f| {
+        let alike = f.lead.place == curve.lead.place && f.depends == curve.depends;
+        alike && f.gain > SURE && f.lead.curve.is_none() && named(spec, f) != "law"
+    })?;
+    let errors = |f: &Fitted| held_out(&f.candidate.plant, &f.fit, estimator, recordings, hold);
+    let better = errors(curve)?.surely_smaller(&errors(term)?);
+    (!better).then(|| term.clone())
+}
+
 /// The second of two effects alone where the first is of no use beside it: both together gain less over it than a second
 /// effect must.
 fn without_first(
@@ -221,9 +240,9 @@ pub(crate) fn search(
     let mut first_map = None;
     let mut accepted_so_far = 0;
     let mut asked = vec![Trial::default(); scope.hypotheses.len()];
-    // One effect more than may be named: the first may be dropped again.
+    // Two steps more than effects may be named: the first may be dropped again, or a term stand for a curve.
     let mut may_drop = true;
-    for _ in 0..=MOST + 1 {
+    for _ in 0..=MOST + 2 {
         let count = accepted_so_far;
         let mut study = Study::new(&now, recordings, &options)?;
         if least_squares {
@@ -282,6 +301,21 @@ pub(crate) fn search(
                 break found;
             }
         };
+        if accepted_so_far == 1 && chance(strongest.0) * (strongest.1 as f64) < LEFT {
+            let estimator = match least_squares {
+                true => Estimator::FreeRun,
+                false => Estimator::Likelihood,
+            };
+            if let Some(term) =
+                named_for_curve(&plant.spec, &steps[0], estimator, recordings, hold)
+            {
+                options.free.truncate(plant.spec.parameters().len());
+                options = with_more(&options, term.candidate.values.len());
+                (now, fit) = (term.candidate.plant.clone(), term.fit.clone());
+                steps[0].insert(0, term);
+                continue;
+            }
+        }
         if least_squares {
             judge_by_blocks(&mut fitted, strongest.1, (&now, &fit), recordings, hold);
         }

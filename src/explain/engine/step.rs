@@ -180,6 +180,25 @@ pub(super) fn step(stage: &Stage) -> Step {
             screen.curves.clear();
         }
     }
+    // What the plant's parameters have done to make up for a term may lead far from what they are beside it.
+    let text = (accepted == 0).then(|| study.nominal());
+    let of_text = |from: &Fit| {
+        let mut point = from.point.clone();
+        let text = text.as_ref()?;
+        point[..text.len()].copy_from_slice(text);
+        Some(Fit {
+            point,
+            ..from.clone()
+        })
+    };
+    // In free run with white noise: under the noise of a fit that does not follow, the values of the text lead to another that
+    // does not.
+    let free = Fit {
+        form: Form::FreeRun,
+        point: fit.point[..study.nominal().len()].to_vec(),
+        ..fit.clone()
+    };
+    let from_text = study.gaussian(&free).and_then(|from| of_text(&from));
     // A noise model that was fitted where physics is missing absorbs it: the same again under white noise.
     let mut free_run = options.least_squares.then(|| fit.clone());
     if !nothing_left && !options.least_squares {
@@ -193,7 +212,7 @@ pub(super) fn step(stage: &Stage) -> Step {
     // Where a free run strays from the recording, what a term would do depends on where the recording was. That an observer
     // follows the noise too is of no matter for where fits start, but would be for the test above.
     if !nothing_left
-        && let Some(white) = free_run
+        && let Some(white) = free_run.or_else(|| from_text.clone())
         && let Some(along) = study.along_recording(&white)
         && let Some(mut s) = screen(study, &white, &along, given, recordings)
     {
@@ -229,18 +248,7 @@ pub(super) fn step(stage: &Stage) -> Step {
             drop_alike(screen, &plant.spec, (first, named(given, first)));
         }
     }
-    let more = times_more(study.count());
-    // What the plant's parameters have done to make up for a term may lead far from what they are beside it.
-    let text = (accepted == 0).then(|| study.nominal());
-    let of_text = |from: &Fit| {
-        let mut point = from.point.clone();
-        let text = text.as_ref()?;
-        point[..text.len()].copy_from_slice(text);
-        Some(Fit {
-            point,
-            ..from.clone()
-        })
-    };
+    let more = times_more(study.count().max(study.samples()));
     let mut glanced: Vec<(f64, Lead, usize, Candidate, Fit)> = tried
         .iter()
         .enumerate()
@@ -341,15 +349,7 @@ pub(super) fn step(stage: &Stage) -> Step {
     fitted.retain(|f| scope.allows(named(&plant.spec, f)));
     let mut origins = vec![fit];
     origins.extend(tried.iter().skip(1).map(|(_, white)| white));
-    // In free run with white noise: under the noise of a fit that does not follow, the values of the text lead to another that
-    // does not.
-    let free = Fit {
-        form: Form::FreeRun,
-        point: fit.point[..study.nominal().len()].to_vec(),
-        ..fit.clone()
-    };
-    let text = study.gaussian(&free).and_then(|from| of_text(&from));
-    origins.extend(&text);
+    origins.extend(&from_text);
     let ground = Ground {
         plant,
         study,

@@ -36,14 +36,14 @@ pub(crate) fn limited(plant: Plant, study: &Study, most: usize) -> Plant {
 }
 /// The best of these are fitted with a noise model of their own, and the best of them until nothing changes.
 pub(crate) const FITTED: usize = 5;
-/// ... and more of short recordings, whose fits cost little and whose tests order leads badly: so many as have this many values
+/// ... and more of short recordings, whose fits cost little and whose tests order leads badly: so many as have this many samples
 /// together, and of each kind and place that many times more leads, up to a limit.
-const CHEAP_VALUES: usize = 4000;
+const CHEAP_SAMPLES: usize = 4000;
 const MOST_TIMES: usize = 4;
 
-/// How many times more of a recording with so many values is tried.
-pub(crate) fn times_more(values: usize) -> usize {
-    (CHEAP_VALUES / (FITTED * values.max(1))).clamp(1, MOST_TIMES)
+/// How many times more of a recording with so many samples is tried, measured or not.
+pub(crate) fn times_more(samples: usize) -> usize {
+    (CHEAP_SAMPLES / (FITTED * samples.max(1))).clamp(1, MOST_TIMES)
 }
 pub(crate) const FINISHED: usize = 4;
 pub(crate) const THOROUGH: Effort = Effort {

@@ -27,6 +27,24 @@ impl std::fmt::Display for Origin {
     }
 }
 
+impl Origin {
+    /// The date and time that [`Display`](std::fmt::Display) has written.
+    pub fn parse(text: &str) -> Option<Self> {
+        let stamp = text.strip_suffix(" UTC");
+        let date: jiff::civil::DateTime = stamp.unwrap_or(text).parse().ok()?;
+        let moment = date.to_zoned(jiff::tz::TimeZone::UTC).ok()?;
+        Some(Self {
+            nanoseconds: moment.timestamp().as_nanosecond(),
+            utc: stamp.is_some(),
+        })
+    }
+
+    /// Seconds from another to this.
+    pub fn since(&self, other: &Self) -> f64 {
+        (self.nanoseconds - other.nanoseconds) as f64 * 1e-9
+    }
+}
+
 /// A time column in seconds.
 #[derive(Debug)]
 pub(crate) struct Stamps {

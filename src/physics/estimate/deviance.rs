@@ -224,9 +224,12 @@ impl<'p, 'a> Deviance<'p, 'a> {
     pub(crate) fn covariances(&mut self, point: &[f64]) -> Covariances {
         let m = point.len();
         let nothing_known = || DMatrix::from_diagonal_element(m, m, f64::INFINITY);
-        let jacobian = self
-            .at(point)
-            .and_then(|runs| Some((self.jacobian(&runs, Slopes::Exact)?.0, runs)));
+        // The derivatives of steps at the edge of stability, as at a contact, may grow without bound; those of the equations do not.
+        let jacobian = self.at(point).and_then(|runs| {
+            let exact = self.jacobian(&runs, Slopes::Exact);
+            let jacobian = exact.or_else(|| self.jacobian(&runs, Slopes::Frozen))?;
+            Some((jacobian.0, runs))
+        });
         let Some((plant, runs)) = jacobian else {
             return Covariances {
                 joint: nothing_known(),

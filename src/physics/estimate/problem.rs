@@ -166,6 +166,14 @@ impl PlantRecording {
         }
     }
 
+    /// Where the first of recordings begins and the last one ends, in seconds.
+    pub(crate) fn span(recordings: &[Self]) -> (f64, f64) {
+        let end = |r: &Self| r.start_time + r.samples() as f64 * r.sample_time;
+        let begins = recordings.iter().map(|r| r.start_time);
+        let begin = begins.reduce(f64::min).unwrap_or(0.0);
+        (begin, recordings.iter().map(end).fold(begin, f64::max))
+    }
+
     /// The samples of this part of what was measured.
     pub(crate) fn first_part(&self, part: f64) -> usize {
         let values = self.measured().len() as f64;

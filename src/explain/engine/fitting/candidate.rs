@@ -62,11 +62,7 @@ pub(crate) fn candidate(
     for (shape, &value) in term.shapes.iter().zip(&lead.shapes) {
         let name = free_name(spec, &format!("{}_{}", term.id, shape.symbol));
         let (min, max) = match shape.starts {
-            Starts::Instants(_) => {
-                let length = recordings.iter().map(|r| r.outputs[0].len()).max()? as f64 * h;
-                let begin = recordings.first()?.start_time;
-                (begin, begin + length)
-            }
+            Starts::Instants(_) => PlantRecording::span(recordings),
             Starts::Samples(_) if term.form.contains("delay") => (0.0, 100.0 * value + h),
             // Shorter times and narrower shapes are not told from none, and cost steps.
             Starts::Samples(_) if term.form.contains("{m}") => (LEAST_SAMPLES * h, f64::INFINITY),

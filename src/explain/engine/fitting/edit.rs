@@ -269,8 +269,18 @@ pub(crate) fn places(spec: &ModelSpec, given: &ModelSpec) -> Vec<Place> {
     let mut found = Vec::new();
     let own = given.parameters().len();
     for (at, equation) in spec.equations.iter().enumerate() {
+        // A rate that is a number or an input of its own is a law, as is what an output shows of a number.
+        let copied = match spec.expressions.node(equation.rest) {
+            Node::Variable(v) => Some(spec.variable(v).kind),
+            _ => None,
+        };
+        let rate = matches!(equation.unknown, Unknown::Derivative(_));
         let plain = equation.coefficient.is_none()
-            && matches!(spec.expressions.node(equation.rest), Node::Variable(_));
+            && copied.is_some_and(|kind| match kind {
+                VariableKind::Parameter => false,
+                VariableKind::Input => !rate,
+                _ => true,
+            });
         let kinematic = matches!(equation.unknown, Unknown::Value(_))
             && equation.coefficient.is_none()
             && adds_states(spec, equation.rest);

@@ -65,10 +65,7 @@ impl Fitted {
         recordings: &[PlantRecording],
     ) -> Self {
         let Some(argument) = argument else {
-            let begin = recordings.first().map_or(0.0, |r| r.start_time);
-            let length = |r: &PlantRecording| r.samples() as f64 * r.sample_time;
-            let longest = recordings.iter().map(length).fold(0.0, f64::max);
-            let range = (begin, begin + longest);
+            let range = PlantRecording::span(recordings);
             return Self { range, ..self };
         };
         Self {

@@ -238,9 +238,8 @@ impl Hypothesis {
         }
         let h = recordings.first().map_or(1.0, |r| r.sample_time);
         if self.depends.iter().any(|d| d == "time") {
-            let length = |r: &PlantRecording| r.outputs.first().map_or(0, Vec::len) as f64 * h;
-            let length = recordings.iter().map(length).fold(h, f64::max);
-            let begin = recordings.first().map_or(0.0, |r| r.start_time);
+            let (begin, end) = PlantRecording::span(recordings);
+            let length = (end - begin).max(h);
             scales.extend((1..10).map(|i| begin + 0.1 * f64::from(i) * length));
             scales.extend([1.0, 3.0, 10.0, 30.0].map(|n| std::f64::consts::TAU * n / length));
         }

@@ -30,7 +30,6 @@ pub(in crate::explain::engine) fn starts(
         .map(|r| r.outputs[0].len())
         .max()
         .unwrap_or(1);
-    let begin = recordings.first().map_or(0.0, |r| r.start_time);
     let of = |parts: &[f64], value: &dyn Fn(&Argument, f64) -> f64| -> Vec<f64> {
         argument.map_or_else(Vec::new, |a| parts.iter().map(|&p| value(a, p)).collect())
     };
@@ -43,10 +42,10 @@ pub(in crate::explain::engine) fn starts(
         Starts::RateSize(parts) => of(parts, &|a, p| p * a.rate_size(h)),
         Starts::Waves(counts) => argument.map_or_else(Vec::new, |a| waves(counts, a, h)),
         Starts::Length(parts) => parts.iter().map(|p| p * samples as f64 * h).collect(),
-        Starts::Instants(parts) => parts
-            .iter()
-            .map(|p| begin + p * samples as f64 * h)
-            .collect(),
+        Starts::Instants(parts) => {
+            let (begin, end) = PlantRecording::span(recordings);
+            parts.iter().map(|p| begin + p * (end - begin)).collect()
+        }
         Starts::Samples(counts) => {
             let measured = spacing(recordings);
             counts.iter().map(|c| c * measured).collect()
