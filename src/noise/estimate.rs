@@ -1,7 +1,7 @@
 //! Which colour a residual has.
 //!
 //! Autoregressions of all orders by Levinson and Durbin, and mixed models of low order by Whittle's likelihood on a
-//! periodogram that is averaged over bins: a step of Fisher's scoring then costs some hundred operations and no pass
+//! periodogram of the prewhitened residual that is averaged over bins: a step of Fisher's scoring then costs some hundred operations and no pass
 //! over the data. Starts are those of Hannan and Rissanen (1982) and a grid of slow poles. The choice among all is by
 //! Schwarz's criterion with the exact likelihood of each.
 
@@ -123,10 +123,14 @@ pub(super) fn colour(
     if colours.mixed().is_empty() || n < VALUES_A_COEFFICIENT * LONG {
         return best.1;
     }
-    let Some(bins) = Bins::new(&filled, n) else {
+    let errors: Vec<Vec<f64>> = stretches
+        .iter()
+        .map(|(v, m)| prewhitened(v, m, mean, &long))
+        .collect();
+    let Some(bins) = Bins::new(&errors, n, &long) else {
         return best.1;
     };
-    let starts = Starts::new(&filled, &covariance, &long);
+    let starts = Starts::new(&filled, &errors, &covariance);
     let coherent = (-COHERENCE / filled.iter().map(Vec::len).max().unwrap_or(1) as f64).exp();
     let mut lower: Option<(Vec<f64>, Vec<f64>)> = None;
     for &(p, q) in colours.mixed() {
@@ -208,6 +212,23 @@ fn bridged(v: &[f64], mask: &[bool], mean: f64) -> Vec<f64> {
         }
     }
     out
+}
+
+/// Errors of a long autoregression in each stretch of what counts, and zero elsewhere. White noise has no jumps at gaps, nor at its
+/// ends, where slow noise has those that leak into all frequencies.
+fn prewhitened(v: &[f64], mask: &[bool], mean: f64, ar: &[f64]) -> Vec<f64> {
+    let filter = Colour::new(ar.to_vec(), Vec::new()).unwrap_or_default();
+    let mut white = Vec::with_capacity(v.len());
+    super::each_stretch(v, mask, |values| {
+        let centred: Vec<f64> = values.iter().map(|v| v - mean).collect();
+        filter.whiten(&centred, 1.0, &mut white);
+    });
+    if super::stand_alone(mask) {
+        return white;
+    }
+    let mut white = white.into_iter();
+    let at = |keep: &bool| if *keep { white.next() } else { None };
+    mask.iter().map(at).map(Option::unwrap_or_default).collect()
 }
 
 /// Sums of lagged products.
@@ -336,23 +357,14 @@ struct Starts {
 }
 
 impl Starts {
-    fn new(filled: &[Vec<f64>], covariance: &[f64], long: &[f64]) -> Self {
-        let filter = Colour::new(long.to_vec(), Vec::new()).unwrap_or_default();
-        let errors: Vec<Vec<f64>> = filled
-            .iter()
-            .map(|v| {
-                let mut e = Vec::with_capacity(v.len());
-                filter.whiten(v, 1.0, &mut e);
-                e
-            })
-            .collect();
+    fn new(filled: &[Vec<f64>], errors: &[Vec<f64>], covariance: &[f64]) -> Self {
         let most = MOST_MIXED as isize;
         let cross = (-most..=most)
             .map(|lag| {
                 let back = lag.unsigned_abs();
                 filled
                     .iter()
-                    .zip(&errors)
+                    .zip(errors)
                     .map(|(v, e)| {
                         if lag >= 0 {
                             product(v.get(back..).unwrap_or_default(), e)
@@ -365,7 +377,7 @@ impl Starts {
             .collect();
         Self {
             values: covariance.iter().take(MOST_MIXED + 1).copied().collect(),
-            errors: autocovariance(&errors, MOST_MIXED),
+            errors: autocovariance(errors, MOST_MIXED),
             cross,
         }
     }

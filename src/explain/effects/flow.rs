@@ -56,11 +56,11 @@ const RADIATION_MIMICS: &[Mimic] = &[Mimic {
 const ZERO_CELSIUS: f64 = 273.15;
 
 fn radiation_celsius(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    radiation(motion.middle() + ZERO_CELSIUS, p[0] + ZERO_CELSIUS)
+    motion.at_middle(|x| radiation(x + ZERO_CELSIUS, p[0] + ZERO_CELSIUS))
 }
 
 fn radiation_kelvin(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    radiation(motion.middle(), p[0])
+    motion.at_middle(|x| radiation(x, p[0]))
 }
 
 /// What a simulation that is linear at `centre` leaves out of `-(t/100)^4`.
@@ -70,7 +70,7 @@ fn radiation(t: f64, centre: f64) -> f64 {
 }
 
 fn orifice(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    motion.input * (p[0] - motion.middle()).max(0.0).sqrt()
+    motion.at_middle(|x| motion.input * (p[0] - x).max(0.0).sqrt())
 }
 
 fn middle(seen: &Observed) -> Vec<Vec<f64>> {

@@ -279,12 +279,11 @@ fn stribeck(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
 }
 
 fn one_way_drag(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    -motion.middle_rate().abs()
+    motion.at_middle_rate(|v| -v.abs())
 }
 
 fn drag(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    let v = motion.middle_rate();
-    -v * v.abs()
+    motion.at_middle_rate(|v| -v * v.abs())
 }
 
 /// Pre-sliding is short against the motion: percents of it.

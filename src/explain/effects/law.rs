@@ -30,6 +30,10 @@ impl Clock {
     }
 }
 
+/// Steps of an implicit force, and the part of it that they settle to.
+const IMPLICIT_STEPS: usize = 20;
+const IMPLICIT_ACCURACY: f64 = 1e-9;
+
 /// What a force sees over the sample interval `[k, k+1)`; `free` is what would be at its end without the force.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Motion {
@@ -59,6 +63,16 @@ impl Motion {
         0.5 * (self.rate + self.rate_free)
     }
 
+    /// A force of the position in the middle of the interval, where it has moved that itself.
+    pub(crate) fn at_middle(&self, force: impl Fn(f64) -> f64) -> f64 {
+        implicit(self.middle(), 0.5 * self.position_gain, force)
+    }
+
+    /// A force of the rate in the middle of the interval, where it has changed that itself.
+    pub(crate) fn at_middle_rate(&self, force: impl Fn(f64) -> f64) -> f64 {
+        implicit(self.middle_rate(), 0.5 * self.rate_gain, force)
+    }
+
     /// Force in `[-limit, limit]` that brings the rate at the end of the interval to rest, or as near as it can: the
     /// implicit step of Moreau and Jean, which sticks without smoothing or chatter.
     pub(crate) fn stopping_force(&self, limit: f64) -> f64 {
@@ -68,6 +82,36 @@ impl Motion {
             -limit * self.rate.signum()
         }
     }
+}
+
+/// The force `f = force(free + gain f)`: the implicit midpoint rule (E. Hairer, C. Lubich and G. Wanner, *Geometric Numerical
+/// Integration*, 2nd ed. 2006, II.1.1). A plant that rests is where its force says; without `gain f` that would be another force on
+/// quick plants. A force that pushes on is taken where it would be without itself.
+fn implicit(free: f64, gain: f64, force: impl Fn(f64) -> f64) -> f64 {
+    let explicit = force(free);
+    // `f - force(free + gain f)` has a root between 0 and the explicit force where that resists.
+    let excess = |f: f64| f - force(free + gain * f);
+    let (mut near, mut far) = ((0.0, -explicit), (explicit, excess(explicit)));
+    if near.1 * far.1 >= 0.0 {
+        return explicit;
+    }
+    let settled = IMPLICIT_ACCURACY * explicit.abs();
+    for _ in 0..IMPLICIT_STEPS {
+        let f = far.0 - far.1 * (far.0 - near.0) / (far.1 - near.1);
+        let left = excess(f);
+        // Illinois' rule: an end that stays counts half.
+        if left * far.1 < 0.0 {
+            near = far;
+        } else {
+            near.1 *= 0.5;
+        }
+        let step = (f - far.0).abs();
+        far = (f, left);
+        if step <= settled || left == 0.0 {
+            break;
+        }
+    }
+    far.0
 }
 
 /// Signals from which starting values are taken.

@@ -272,11 +272,11 @@ fn gravity(angle: f64) -> f64 {
 }
 
 fn gravity_degrees(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    gravity(motion.middle().to_radians()).to_degrees()
+    motion.at_middle(|x| gravity(x.to_radians()).to_degrees())
 }
 
 fn gravity_radians(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    gravity(motion.middle())
+    motion.at_middle(gravity)
 }
 
 /// One start without a shape where the position moves as an angle does: over a tenth of a turn and not over many turns.
@@ -308,7 +308,7 @@ fn parts_of_a_turn(seen: &Observed) -> Vec<Vec<f64>> {
 }
 
 fn curve(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    super::law::curve(p, motion.middle())
+    motion.at_middle(|x| super::law::curve(p, x))
 }
 
 fn no_shape(_: &Observed) -> Vec<Vec<f64>> {
@@ -316,8 +316,7 @@ fn no_shape(_: &Observed) -> Vec<Vec<f64>> {
 }
 
 fn cubic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    let x = motion.middle();
-    -x * x * x
+    motion.at_middle(|x| -x * x * x)
 }
 
 /// About its own centre; and taken at a fitted instant of the sample interval, because a force that is held over the
@@ -328,17 +327,15 @@ fn cubic_off_centre(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
 }
 
 fn odd_quadratic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    let x = motion.middle();
-    -x * x.abs()
+    motion.at_middle(|x| -x * x.abs())
 }
 
 fn even_quadratic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    let x = motion.middle();
-    -x * x
+    motion.at_middle(|x| -x * x)
 }
 
 fn cogging(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    -(std::f64::consts::TAU * motion.middle() / p[0] + p[1]).sin()
+    motion.at_middle(|x| -(std::f64::consts::TAU * x / p[0] + p[1]).sin())
 }
 
 fn input_times_position(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
@@ -346,16 +343,15 @@ fn input_times_position(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
 }
 
 fn upper_stop(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    -(motion.middle() - p[0]).max(0.0)
+    motion.at_middle(|x| -(x - p[0]).max(0.0))
 }
 
 fn lower_stop(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    (p[0] - motion.middle()).max(0.0)
+    motion.at_middle(|x| (p[0] - x).max(0.0))
 }
 
 fn both_stops(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    let x = motion.middle();
-    x.clamp(-p[0], p[0]) - x
+    motion.at_middle(|x| x.clamp(-p[0], p[0]) - x)
 }
 
 /// Contact of stiffness 1 at penetration `depth` that grows with `speed`; it never pulls.

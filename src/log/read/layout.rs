@@ -265,9 +265,14 @@ fn header_row(
         let row = cut(bare(*index), separator);
         row.len().abs_diff(count) <= 1 && row.iter().any(|cell| !cell.is_empty())
     };
+    // Comments may stand between the header and the data.
+    let comment = |index: &usize| {
+        let line = lines.get(*index).map_or("", |line| line.trim_start());
+        line.starts_with(['#', '%']) && !fits(index)
+    };
     let above: Vec<usize> = (from..data)
         .rev()
-        .filter(|index| !bare(*index).trim().is_empty())
+        .filter(|index| !bare(*index).trim().is_empty() && !comment(index))
         .take(MOST_HEADER_ROWS)
         .take_while(fits)
         .collect();

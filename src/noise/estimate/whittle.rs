@@ -43,7 +43,8 @@ pub(super) struct Bins {
 }
 
 impl Bins {
-    pub(super) fn new(filled: &[Vec<f64>], count: usize) -> Option<Self> {
+    /// Of a residual that the autoregression `ar` has whitened to `filled`, with `count` values that are none of the gaps.
+    pub(super) fn new(filled: &[Vec<f64>], count: usize, ar: &[f64]) -> Option<Self> {
         let longest = filled.iter().map(Vec::len).max()?;
         let top = longest / 2;
         // Upper edge of each bin, in bins of the longest.
@@ -90,8 +91,14 @@ impl Bins {
         for ((count, power), place) in counts.into_iter().zip(powers).zip(places) {
             if count > 0.0 && power > 0.0 {
                 let w = std::f64::consts::TAU * place / count / longest as f64;
+                // Flat within a bin before this.
+                let whitens = ar
+                    .iter()
+                    .enumerate()
+                    .map(|(i, a)| Complex64::from_polar(*a, -w * (i + 1) as f64))
+                    .fold(Complex64::new(1.0, 0.0), |sum, term| sum + term);
                 bins.count.push(count);
-                bins.power.push(power / count);
+                bins.power.push(power / count / whitens.norm_sqr());
                 bins.turns.push(std::array::from_fn(|k| {
                     Complex64::from_polar(1.0, -w * (k + 1) as f64)
                 }));

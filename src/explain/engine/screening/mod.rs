@@ -6,3 +6,4 @@ pub(crate) mod map;
 pub(crate) mod path;
 pub(crate) mod projection;
 pub(crate) mod screen;
+pub(in crate::explain::engine) mod sensor_limits;
