@@ -18,6 +18,7 @@ mod plant_feedback;
 mod plant_few_samples;
 mod plant_forms;
 mod plant_gravity;
+mod plant_habits;
 mod plant_held_out;
 mod plant_hypotheses;
 mod plant_initial_states;

@@ -10,11 +10,13 @@ const WRITTEN: &[&[&str]] = &[
     &["K", "k", "kelvin"],
 ];
 
-/// Units of a speed.
-const SPEEDS: &[&str] = &[
-    "m/s", "km/h", "kmh", "kph", "mph", "kn", "knots", "mm/s", "cm/s", "rpm", "1/min", "min-1",
-    "u/min", "rad/s", "rads", "deg/s", "\u{b0}/s", "mps", "rps", "hz",
+/// Units of a speed or a flow that are not written as something by time.
+const RATES: &[&str] = &[
+    "kmh", "kph", "mph", "kn", "knots", "rpm", "min-1", "rads", "degs", "mps", "rps", "hz", "lpm",
+    "lph", "lmin", "gpm", "cfm", "sccm", "m3h", "m3s", "kgh", "kgs",
 ];
+/// What stands after the slash of one that is.
+const BY_TIME: &[&str] = &["s", "sec", "min", "h", "hr", "d"];
 
 /// Units of a position or an angle.
 const POSITIONS: &[&str] = &[
@@ -44,9 +46,12 @@ pub(crate) fn is_in(channel: &Channel, unit: &str) -> bool {
     })
 }
 
-/// Whether `channel` is a speed.
-pub(crate) fn is_speed(channel: &Channel) -> bool {
-    written(channel).is_some_and(|written| SPEEDS.contains(&written.as_str()))
+/// Whether `channel` is a speed or a flow.
+pub(crate) fn is_rate(channel: &Channel) -> bool {
+    written(channel).is_some_and(|written| {
+        let by_time = |(_, time): (&str, &str)| BY_TIME.contains(&time);
+        RATES.contains(&written.as_str()) || written.rsplit_once('/').is_some_and(by_time)
+    })
 }
 
 /// Whether `channel` is a position or an angle.
@@ -73,9 +78,10 @@ mod tests {
         assert!(is_in(&channel("angle", Some("deg")), "deg"));
         assert!(!is_in(&channel("angle", Some("deg")), "degC"));
         assert!(!is_in(&channel("level", None), "K"));
-        assert!(is_speed(&channel("v_kmh", None)));
-        assert!(is_speed(&channel("speed", Some("RPM"))));
-        assert!(!is_speed(&channel("disp_mm", None)));
+        assert!(is_rate(&channel("v_kmh", None)));
+        assert!(is_rate(&channel("speed", Some("RPM"))));
+        assert!(is_rate(&channel("flow", Some("m3/h"))) && is_rate(&channel("q", Some("l/min"))));
+        assert!(!is_rate(&channel("disp_mm", None)));
         assert!(is_position(&channel("disp_mm", None)));
         assert!(is_position(&channel("angle", Some("Deg"))));
         assert!(!is_position(&channel("T", Some("K"))) && !is_position(&channel("y", None)));

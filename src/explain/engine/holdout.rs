@@ -73,7 +73,9 @@ impl HeldOut {
     /// differences of squares, with as many of them as are independent (F. X. Diebold and R. S. Mariano, *J. Bus. Econ. Stat.* 13, 1995).
     fn chance_of_output(&self, other: &Self, output: usize) -> f64 {
         let pairs = self.errors[output].iter().zip(&other.errors[output]);
-        let smaller: Vec<f64> = pairs.map(|(own, other)| other * other - own * own).collect();
+        let smaller: Vec<f64> = pairs
+            .map(|(own, other)| other * other - own * own)
+            .collect();
         let known = || smaller.iter().filter(|d| d.is_finite());
         let count = known().count().max(1) as f64;
         let mean = known().sum::<f64>() / count;

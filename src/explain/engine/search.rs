@@ -306,8 +306,7 @@ pub(crate) fn search(
                 true => Estimator::FreeRun,
                 false => Estimator::Likelihood,
             };
-            if let Some(term) =
-                named_for_curve(&plant.spec, &steps[0], estimator, recordings, hold)
+            if let Some(term) = named_for_curve(&plant.spec, &steps[0], estimator, recordings, hold)
             {
                 options.free.truncate(plant.spec.parameters().len());
                 options = with_more(&options, term.candidate.values.len());

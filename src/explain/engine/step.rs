@@ -14,7 +14,6 @@ use super::fitting::second_effect::drop_alike;
 use super::hypothesis::{Ground, trials};
 use super::scope::Scope;
 use super::screening::screen::{Lead, Screen, screen};
-use super::screening::sensor_limits::shows_beyond_limits;
 use super::terms::names::{SPECIFIC, called, named, rank_of};
 use super::thresholds::{
     AT_A_PLACE, BETTER, COMPARED, FINISHED, FITTED, FOLLOWS, FORETOLD, GLANCE, GLANCED,
@@ -346,11 +345,6 @@ pub(super) fn step(stage: &Stage) -> Step {
     let fitted = drop_repeated(fitted);
     let mut fitted = finished(fitted, study, fit, recordings, options);
     fitted.retain(|f| f.gain <= NEEDED || f.gain_without_few(study, fit, options) > NEEDED);
-    fitted.retain(|f| {
-        let options = with_more(options, f.candidate.values.len());
-        let own = study.of(&f.candidate.plant, &options);
-        !own.is_ok_and(|own| shows_beyond_limits(f, &own, recordings))
-    });
     // Values of the fit may make another name of a term.
     fitted.retain(|f| scope.allows(named(&plant.spec, f)));
     let mut origins = vec![fit];

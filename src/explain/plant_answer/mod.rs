@@ -183,16 +183,16 @@ impl Answer<'_> {
             .enumerate()
             .filter_map(|(i, fitted)| self.effect(i, fitted))
             .collect();
-        // Where a test finds structure, a name must make blocks left out better by more than chance. Where much is left, a name is
-        // given only to what explains more of them than it leaves, and leaves little: a curve may follow what enters elsewhere; a
-        // term with a name of its own claims more.
+        // A name must make blocks left out better by more than chance. Where much structure is left, it is given only to what explains
+        // more of them than it leaves, and leaves little: a curve may follow what enters elsewhere; a term with a name of its own claims
+        // more.
         let curves = effects.iter().any(|e| e.effect == "law");
         // Blocks alone prove a name only where no test finds structure beside it.
         let proved = p_value >= LEFT && best.is_some_and(|b| b.proved);
         let sure = (gain >= SURE || proved)
             && follows
             && self.effects().all(|fitted| self.is_significant(fitted))
-            && (p_value >= LEFT || better)
+            && better
             && (adequate || explains && !curves);
         let runs = self.free_runs();
         let l = self.base.outputs();

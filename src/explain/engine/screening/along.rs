@@ -20,11 +20,6 @@ pub(in crate::explain::engine) fn range_along(
     Some((from, values.iter().copied().max_by(f64::total_cmp)?))
 }
 
-/// Every so many samples of a recording are looked at.
-pub(super) fn every(recording: &PlantRecording) -> usize {
-    (recording.samples() / LOOKED_AT).max(1)
-}
-
 /// Values of expressions in the variables of a plant along its predictions, for all recordings one after the other.
 pub(in crate::explain::engine) fn along(
     (study, fit): (&Study, &Fit),
@@ -52,7 +47,7 @@ pub(in crate::explain::engine) fn along(
     for ((trajectory, recording), point) in trajectories.iter().zip(recordings).zip(points) {
         let samples = recording.samples();
         let mut lineariser = plant.lineariser(&point);
-        for k in (0..samples).step_by(every(recording)) {
+        for k in (0..samples).step_by((samples / LOOKED_AT).max(1)) {
             let state: Vec<f64> = trajectory.states.iter().map(|x| x[k]).collect();
             let inputs: Vec<f64> = recording.inputs.iter().map(|u| u[k]).collect();
             let time = recording.start_time + k as f64 * recording.sample_time;

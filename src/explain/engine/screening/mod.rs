@@ -6,4 +6,3 @@ pub(crate) mod map;
 pub(crate) mod path;
 pub(crate) mod projection;
 pub(crate) mod screen;
-pub(in crate::explain::engine) mod sensor_limits;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::linear_answer::Answer;
-use crate::explain::document::channel_units::{is_position, is_speed};
+use crate::explain::document::channel_units::{is_position, is_rate};
 use crate::explain::document::sentences;
 use crate::explain::effects::{self, Action, Definition, Port};
 use crate::explain::explanation::{
@@ -24,8 +24,9 @@ use crate::log::Channel;
 enum Called {
     /// As the library calls it.
     Itself,
-    /// What grows with the square of a speed is a drag, whatever state of the plant it is.
+    /// What grows with the square or the cube of a speed or a flow is a drag, whatever state of the plant it is.
     Drag,
+    CubicDrag,
     /// A spring is a function of a position or an angle, or makes the plant oscillate. The same function of a temperature or a level
     /// is a loss or an outflow, which linear models cannot tell apart.
     Law,
@@ -33,7 +34,8 @@ enum Called {
 
 fn called(definition: &Definition, output: &Channel, plant: &Plant) -> Called {
     match definition.id {
-        "quadratic_stiffness" if definition.variant == "odd" && is_speed(output) => Called::Drag,
+        "quadratic_stiffness" if definition.variant == "odd" && is_rate(output) => Called::Drag,
+        "cubic_stiffness" if definition.variant.is_empty() && is_rate(output) => Called::CubicDrag,
         "quadratic_stiffness" | "cubic_stiffness"
             if !is_position(output) && !plant.oscillates() =>
         {
@@ -109,7 +111,7 @@ impl Answer<'_> {
                 Called::Drag => effects::find("quadratic_drag", "").unwrap_or(definition),
                 _ => definition,
             };
-            if called == Called::Drag
+            if matches!(called, Called::Drag | Called::CubicDrag)
                 && let Some(drag) = parameters.remove("stiffness")
             {
                 parameters.insert("drag".to_owned(), drag);
@@ -138,11 +140,16 @@ impl Answer<'_> {
                 sentence: String::new(),
             };
             effect_found.sentence = sentences::sentence(definition, &effect_found);
+            if called == Called::CubicDrag {
+                let stiffness = &effect_found.sentence;
+                effect_found.sentence = stiffness.replace("cubic stiffness", "cubic drag");
+                effect_found.effect = "cubic_drag".to_owned();
+            }
             if called == Called::Law {
                 effect_found.effect = "law".to_owned();
                 effect_found.depends = vec![output.name.clone()];
                 effect_found.sentence = format!(
-                    "A function of {0} acts where the input does: {1}. The slowest mode of the plant does not oscillate, and {0} has no unit of a position: \
+                    "A function of {0} acts where the input does: {1}. The slowest mode of the plant does not oscillate, and {0} has no unit of a position or a rate: \
                      a spring, a loss and an outflow look alike.",
                     output.name, definition.equation
                 );

@@ -109,7 +109,9 @@ fn blocks_left_out_do_not_change_the_colour() {
     let truth = Colour::new(vec![-1.5, 0.64], vec![0.5]).unwrap();
     for seed in 0..10 {
         let v = drawn(&truth.ar, &truth.ma, 2000, 90 + seed);
-        let mask: Vec<bool> = (0..v.len()).map(|k| k % 250 < 110 || k % 250 >= 140).collect();
+        let mask: Vec<bool> = (0..v.len())
+            .map(|k| k % 250 < 110 || k % 250 >= 140)
+            .collect();
         let stretch = [(v.as_slice(), mask.as_slice())];
         let found = colour(&vec![v.clone()], 1, 0, &vec![mask.clone()], Colours::All);
         let worse = deviance(&found, &stretch, 0.0) - deviance(&truth, &stretch, 0.0);
