@@ -22,14 +22,28 @@ const LAST_TERM: f64 = 1e-9;
 /// Square matrices by rows.
 type Matrix = Vec<f64>;
 
+/// Most plants have few states: loops of a length that the compiler knows run in wide registers.
 #[inline(always)]
 fn product(n: usize, a: &[f64], b: &[f64], into: &mut [f64]) {
-    into.fill(0.0);
-    for i in 0..n {
-        for k in 0..n {
-            let factor = a[i * n + k];
-            for j in 0..n {
-                into[i * n + j] += factor * b[k * n + j];
+    match n {
+        0 => {}
+        1 => by_rows(1, a, b, into),
+        2 => by_rows(2, a, b, into),
+        3 => by_rows(3, a, b, into),
+        4 => by_rows(4, a, b, into),
+        5 => by_rows(5, a, b, into),
+        6 => by_rows(6, a, b, into),
+        _ => by_rows(n, a, b, into),
+    }
+}
+
+#[inline(always)]
+fn by_rows(n: usize, a: &[f64], b: &[f64], into: &mut [f64]) {
+    for (row, into) in a.chunks_exact(n).zip(into.chunks_exact_mut(n)) {
+        into.fill(0.0);
+        for (factor, b) in row.iter().zip(b.chunks_exact(n)) {
+            for (to, b) in into.iter_mut().zip(b) {
+                *to += factor * b;
             }
         }
     }
