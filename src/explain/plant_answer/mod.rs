@@ -170,12 +170,14 @@ impl Answer<'_> {
         let feedback = self.depends_on_feedback();
         let (follows, explains, better) = match &self.found.held_out {
             None => (true, false, true),
-            Some([without, with]) if feedback => (true, false, with.surely_smaller(without)),
             Some([without, with]) => {
                 let closely = with.follows_closely();
                 let removes = with.removed(without) >= EXPLAINED;
-                let better = with.surely_smaller(without);
-                (without.follows() || closely, removes && closely, better)
+                let better = removes || with.surely_smaller(without);
+                match feedback {
+                    true => (true, false, better),
+                    false => (without.follows() || closely, removes && closely, better),
+                }
             }
         };
         let effects: Vec<EffectFound> = self
@@ -183,9 +185,9 @@ impl Answer<'_> {
             .enumerate()
             .filter_map(|(i, fitted)| self.effect(i, fitted))
             .collect();
-        // A name must make blocks left out better by more than chance. Where much structure is left, it is given only to what explains
-        // more of them than it leaves, and leaves little: a curve may follow what enters elsewhere; a term with a name of its own claims
-        // more.
+        // A name must take half of the mean square off blocks left out, or more off them than chance does. Where much structure is left,
+        // it is given only to what does the first, and leaves little: a curve may follow what enters elsewhere; a term with a name of
+        // its own claims more.
         let curves = effects.iter().any(|e| e.effect == "law");
         // Blocks alone prove a name only where no test finds structure beside it.
         let proved = p_value >= LEFT && best.is_some_and(|b| b.proved);
@@ -269,7 +271,7 @@ impl Answer<'_> {
             astray,
             refused,
         });
-        // What is not sure predicts a fresh recording only where it makes blocks left out better by more than chance.
+        // What is not sure predicts a fresh recording only where it makes blocks left out better, as a name must.
         let relied_on = verdict != Verdict::Unexplained || effects.is_empty() || better;
         if !relied_on {
             summary.push(
