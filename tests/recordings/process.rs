@@ -90,12 +90,16 @@ fn cascaded_tanks() {
             }
         }
         let rims = &said["effects"][1]["parameters"];
-        // The recorded level ends at 10 V.
+        // The recorded level ends at 10 V; the rim is estimated beside slow errors of the whole model, which its uncertainty knows as
+        // noise only.
         let (rim, std) = (
             rims["lower_rim"]["value"].as_f64().unwrap(),
             rims["lower_rim"]["std"].as_f64().unwrap(),
         );
-        assert!((rim - 10.0).abs() < 3.0 * std, "{rim} +- {std}");
+        assert!(
+            (rim - 10.0).abs() < 0.05 * 10.0 && std < 0.2,
+            "{rim} +- {std}"
+        );
         let page = fs::read_to_string(folder.join("page.html")).unwrap();
         assert!(page.contains("tank outflow (square root)"));
         let prediction = simulated(&folder, "explanation.json", "cascaded_tanks_val.csv");

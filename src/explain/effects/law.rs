@@ -65,7 +65,13 @@ impl Motion {
 
     /// A force of the position in the middle of the interval, where it has moved that itself.
     pub(crate) fn at_middle(&self, force: impl Fn(f64) -> f64) -> f64 {
-        implicit(self.middle(), 0.5 * self.position_gain, force)
+        self.at_instant(0.5, force)
+    }
+
+    /// The same at another instant, as a part of the interval.
+    pub(crate) fn at_instant(&self, part: f64, force: impl Fn(f64) -> f64) -> f64 {
+        let free = self.position + part * (self.position_free - self.position);
+        implicit(free, part * self.position_gain, force)
     }
 
     /// A force of the rate in the middle of the interval, where it has changed that itself.

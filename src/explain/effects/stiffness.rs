@@ -322,8 +322,7 @@ fn cubic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
 /// About its own centre; and taken at a fitted instant of the sample interval, because a force that is held over the
 /// interval stands for one that moves in it, which matters when an oscillation has few samples.
 fn cubic_off_centre(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
-    let x = motion.position + p[1] * (motion.position_free - motion.position) - p[0];
-    -x * x * x
+    motion.at_instant(p[1], |x| -(x - p[0]).powi(3))
 }
 
 fn odd_quadratic(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {

@@ -122,7 +122,7 @@ fn ratio(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Error of the free run over all recordings, as a part of the standard deviation: the geometric mean over outputs.
-pub(super) fn free_run_error(
+pub(crate) fn free_run_error(
     study: &Study,
     fit: &Fit,
     recordings: &[PlantRecording],
@@ -217,7 +217,7 @@ fn only_states(plant: &Plant, hold: Hold) -> EstimateOptions {
 }
 
 /// The plant with the values of its text, and the initial states that fit the recordings best.
-pub(super) fn as_given(plant: &Plant, recordings: &[PlantRecording], hold: Hold) -> Option<Fit> {
+pub(crate) fn as_given(plant: &Plant, recordings: &[PlantRecording], hold: Hold) -> Option<Fit> {
     let options = only_states(plant, hold);
     let study = Study::new(plant, recordings, &options).ok()?;
     let fit = study.least_squares(&study.nominal())?;

@@ -233,7 +233,17 @@ impl Answer<'_> {
         let asked = effects.is_empty() && !self.found.misled;
         let baseline = (&self.base, &self.found.baseline);
         let astray = asked
-            .then(|| astray(&each, strays, self.plant, baseline, self.recordings))
+            .then(|| {
+                let as_in_text = parameters.is_empty();
+                astray(
+                    &each,
+                    strays,
+                    self.plant,
+                    baseline,
+                    self.recordings,
+                    as_in_text,
+                )
+            })
             .flatten();
         let (differs, together) = match effects.is_empty() && parameters.is_empty() {
             true => self.differs(),

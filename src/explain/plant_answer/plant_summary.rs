@@ -84,6 +84,9 @@ impl Answer<'_> {
                     Astray::WorseThanConstant(output) => format!(
                         "A constant follows {output} better than the free run of the equations does."
                     ),
+                    Astray::AsConstant => "A constant follows the recording better than the equations do with the values of the text, and \
+                                           as well as they do with any others."
+                        .to_owned(),
                     Astray::Slow if told.strays > STRAYS => format!(
                         "The free run leaves {:.1} times the error of one-step predictions, and more than half of the variance: \
                          no noise of a sensor is so slow.",

@@ -1,6 +1,6 @@
 //! Whether a free run without an effect is too poor for "nothing is missing" to be said of it.
 
-use crate::explain::engine::holdout::SATISFACTORY;
+use crate::explain::engine::holdout::{SATISFACTORY, as_given, free_run_error};
 use crate::explain::engine::misled::growth;
 use crate::explain::explanation::OutputFit;
 use crate::physics::Plant;
@@ -20,6 +20,8 @@ pub(in crate::explain::plant_answer) enum Astray {
     Slow,
     /// A constant leaves less of this output, by more than its one number takes off noise.
     WorseThanConstant(String),
+    /// A constant leaves less of the outputs than the values of the text, which nothing refutes, and as little as any others.
+    AsConstant,
 }
 
 /// What the free run without an effect leaves of the variance of an output.
@@ -39,15 +41,29 @@ pub(in crate::explain::plant_answer) fn astray(
     plant: &Plant,
     (study, fit): (&Study, &Fit),
     recordings: &[PlantRecording],
+    as_in_text: bool,
 ) -> Option<Astray> {
     let share = study.effective_share(fit);
     // The variance of one-step errors is about that part of what a slow error has.
     let slow = strays > STRAYS || share.is_some_and(|share| share < STRAYS.powi(-2));
     let independent = share.unwrap_or(1.0) * (study.count() / outputs.len().max(1)) as f64;
     let beaten = |o: &&OutputFit| independent * left(o).ln() > ONE_NUMBER;
+    // By Schwarz's criterion, against the one number of a constant.
+    let numbers = (fit.point.len() as f64 - 1.0).max(0.0);
+    let no_better =
+        |o: &OutputFit| independent * left(o).ln() > -numbers * independent.max(1.0).ln();
+    let text_is_beaten = || {
+        let given = as_given(plant, recordings, study.hold())?;
+        let error = free_run_error(study, &given, recordings)?;
+        Some(2.0 * independent * error.ln() > ONE_NUMBER)
+    };
     let found = match outputs.iter().find(beaten) {
         Some(o) => Some(Astray::WorseThanConstant(o.output.clone())),
-        None => (slow && outputs.iter().any(leaves_half)).then_some(Astray::Slow),
+        None if slow && outputs.iter().any(leaves_half) => Some(Astray::Slow),
+        None => (as_in_text && outputs.iter().all(no_better))
+            .then(text_is_beaten)
+            .flatten()
+            .and_then(|beaten| beaten.then_some(Astray::AsConstant)),
     };
     let held = || {
         let inputs = !plant.spec.inputs().is_empty();

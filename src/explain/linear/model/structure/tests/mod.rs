@@ -182,7 +182,12 @@ fn a_simulation_is_the_recursion() {
             &free.initial[s],
             &inputs,
             &direction,
-            |x, free, u| -(0.5 * (position(x, u) + position(free, u))).powi(3),
+            // In the middle of the interval, where it has moved that itself.
+            |x, free, u| {
+                let middle = 0.5 * (position(x, u) + position(free, u));
+                let gain = 0.5 * dot(&signal.position, &direction);
+                (0..60).fold(0.0, |f: f64, _| -(middle + gain * f).powi(3))
+            },
         );
         wanted[1].iter_mut().for_each(|y| *y += 0.7);
         same(&simulated[2 * s..2 * s + 2], &wanted);
