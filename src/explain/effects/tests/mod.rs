@@ -587,7 +587,8 @@ fn sensors_show_what_their_equations_say() {
 /// A plant of one state, `x+ = a x + (1 - a)(u - k f(x))`, comes to rest where `x + k f(x) = u`, however quick it is.
 #[test]
 fn a_plant_rests_where_its_force_says() {
-    let laws: [(&str, &str, fn(f64) -> f64); 3] = [
+    type Force = fn(f64) -> f64;
+    let laws: [(&str, &str, Force); 3] = [
         ("quadratic_drag", "", |v| v * v.abs()),
         ("cubic_stiffness", "", |x| x * x * x),
         ("quadratic_stiffness", "odd", |x| x * x.abs()),
