@@ -1,5 +1,7 @@
 //! Every law against its equation, integrated in small steps or written out, and against what it must keep.
 
+mod implicit_force_tests;
+
 use approx::assert_abs_diff_eq;
 
 use super::*;
@@ -580,30 +582,6 @@ fn sensors_show_what_their_equations_say() {
         let found = seen(id, variant, parameters, &y);
         for (found, wanted) in found.iter().zip(wanted) {
             assert_abs_diff_eq!(*found, wanted, epsilon = 1e-9);
-        }
-    }
-}
-
-/// A plant of one state, `x+ = a x + (1 - a)(u - k f(x))`, comes to rest where `x + k f(x) = u`, however quick it is.
-#[test]
-fn a_plant_rests_where_its_force_says() {
-    type Force = fn(f64) -> f64;
-    let laws: [(&str, &str, Force); 3] = [
-        ("quadratic_drag", "", |v| v * v.abs()),
-        ("cubic_stiffness", "", |x| x * x * x),
-        ("quadratic_stiffness", "odd", |x| x * x.abs()),
-    ];
-    for (id, variant, law) in laws {
-        for a in [0.97, 0.5, 0.05] {
-            let (k, u) = (2.0, -3.0);
-            let gain = (1.0 - a) * k;
-            let mut x = 0.0;
-            for sample in 0..4000 {
-                let free = a * x + (1.0 - a) * u;
-                let moves = motion(sample, [x, x], [free, free], [gain, gain]);
-                x = free + gain * force(id, variant)(&[], &moves, &mut [0.0; 3]);
-            }
-            assert_abs_diff_eq!(x + k * law(x), u, epsilon = 1e-7);
         }
     }
 }
