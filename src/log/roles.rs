@@ -428,9 +428,9 @@ fn default_time(header: &Header, taken: &[usize]) -> Option<usize> {
         .or_else(|| named(&|name| name == "T"))
 }
 
-/// `Time_s`, `timestamp`, `epoch_ms`, `Zeit`, `Seconds` and the like.
-fn is_usual_time(name: &str) -> bool {
-    if TimeUnit::of_word(name).is_some() {
+/// `t`, `time`, `Time_s`, `timestamp`, `epoch_ms`, `Zeit`, `Seconds` and the like.
+pub(super) fn is_usual_time(name: &str) -> bool {
+    if name == "t" || name.eq_ignore_ascii_case("time") || TimeUnit::of_word(name).is_some() {
         return true;
     }
     let bare = match TimeUnit::of_name(name) {

@@ -161,17 +161,14 @@ fn standardised(values: &[f64]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+
     use super::*;
 
     /// An input of steps, of its own or answering the residual of so many samples before.
     fn recorded(gain: f64, before: usize) -> (Series, Mask, Vec<Vec<f64>>) {
-        let mut state = 7u64;
-        let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (state >> 33) as f64 / f64::from(1u32 << 31) - 0.5
-        };
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+        let mut uniform = || random.random::<f64>() - 0.5;
         let e: Vec<f64> = (0..2000).map(|_| uniform()).collect();
         let mut level = 0.0;
         let u = (0..2000usize).map(|k| {

@@ -19,7 +19,7 @@ mod syntax;
 mod units;
 
 pub use error::{SpecError, SpecErrorKind, render_all};
-pub(crate) use expression::{Binary, ExpressionId, Node};
+pub(crate) use expression::{Binary, ExpressionId, Function, Node};
 pub use expression::{Span, VariableId};
 pub use operating_point::{Linearisation, OperatingPlant, OperatingPoint, OperatingPointError};
 pub use simulated::{Run, RunError, Simulated, Slopes};

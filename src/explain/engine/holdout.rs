@@ -334,6 +334,8 @@ pub(super) fn held_out(
 
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+
     use super::*;
 
     #[test]
@@ -362,13 +364,8 @@ mod tests {
     /// Under slow errors a small difference of their mean squares is chance, under white ones it is not.
     #[test]
     fn slow_errors_are_few() {
-        let mut state = 3u64;
-        let mut noise = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (state >> 33) as f64 / f64::from(1u32 << 31) - 0.5
-        };
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut noise = || random.random::<f64>() - 0.5;
         let mut judged = |memory: f64, smaller: f64| {
             let mut runs = |size: f64| {
                 let mut x = 0.0;

@@ -13,6 +13,7 @@ pub(crate) mod scope;
 pub(crate) mod screening;
 pub(crate) mod search;
 pub(crate) mod select;
+pub(crate) mod shared_terms;
 mod step;
 pub(crate) mod terms;
 pub(crate) mod thresholds;

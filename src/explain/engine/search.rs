@@ -44,6 +44,8 @@ pub(crate) struct Found {
     pub(crate) reacting: Vec<usize>,
     /// Whether free runs mislead a search, by that or because they add up disturbances.
     pub(crate) misled: bool,
+    /// Without an effect, one that few independent values hide.
+    pub(crate) likelier: Option<Fitted>,
     /// Values that were searched, and what part of long recordings they are.
     pub(crate) values: usize,
     pub(crate) part: Option<Searched>,
@@ -111,9 +113,9 @@ impl Found {
     }
 }
 
-/// What blocks left out say of free runs, where values that depend on each other make a criterion weak: a candidate that the
-/// criterion speaks for more than chance does is accepted if it takes more than half of the mean square off them, and named where it takes
-/// as much off what any other function leaves.
+/// What blocks left out say of free runs, where values that depend on each other make a criterion weak. A candidate is accepted if it
+/// takes more than half of the mean square off them, and the criterion speaks for it more than chance does, or it is likelier with noise
+/// models of both residuals. It is named where it takes as much off what any other function leaves, by the first of these.
 /// One that halves what the best leaves comes before it. What depends on time alone is not accepted so: its value in a block is a
 /// level that any slow error has.
 fn judge_by_blocks(
@@ -121,14 +123,36 @@ fn judge_by_blocks(
     tests: usize,
     (plant, fit): (&Plant, &Fit),
     recordings: &[PlantRecording],
-    hold: Hold,
+    options: &EstimateOptions,
 ) {
-    let errors_of =
-        |plant: &Plant, fit: &Fit| held_out(plant, fit, Estimator::FreeRun, recordings, hold);
+    let errors_of = |plant: &Plant, fit: &Fit| {
+        held_out(plant, fit, Estimator::FreeRun, recordings, options.hold)
+    };
+    let in_colour = |plant: &Plant, fit: &Fit, more: usize| {
+        let options = with_more(options, more);
+        let study = Study::new(plant, recordings, &options).ok()?;
+        study.criterion_in_colour(fit)
+    };
+    let in_time = |f: &Fitted| f.lead.term.needs == Needs::Time;
+    // Of so many tests the largest gains about that much by chance (the maximum of as many chi-squares with one degree of freedom).
+    let by_chance = 2.0 * (tests.max(1) as f64).ln();
+    let alone = in_colour(plant, fit, 0);
+    let count = fitted.len().min(FINISHED);
+    let likely: Vec<bool> = fitted[..count]
+        .par_iter()
+        .map(|f| {
+            let own = in_colour(&f.candidate.plant, &f.fit, f.candidate.values.len());
+            let gain = alone.zip(own).map(|(alone, own)| alone - own);
+            gain.is_some_and(|gain| gain > NEEDED) && !in_time(f)
+        })
+        .collect();
+    for (f, likely) in fitted.iter_mut().zip(&likely) {
+        f.likelier = *likely && f.gain > by_chance;
+    }
     let Some(without) = errors_of(plant, fit) else {
         return;
     };
-    let judged: Vec<(usize, HeldOut)> = (0..fitted.len().min(FINISHED))
+    let judged: Vec<(usize, HeldOut)> = (0..count)
         .into_par_iter()
         .filter_map(|i| Some((i, errors_of(&fitted[i].candidate.plant, &fitted[i].fit)?)))
         .collect();
@@ -138,14 +162,13 @@ fn judge_by_blocks(
         of(&fitted[i]) != of(&fitted[j])
     };
     let explains = |errors: &HeldOut| errors.follows() && errors.removed(&without) >= EXPLAINED;
-    // Of so many tests the largest gains about that much by chance (the maximum of as many chi-squares with one degree of freedom).
-    let by_chance = 2.0 * (tests.max(1) as f64).ln();
-    let provable =
-        |i: usize| fitted[i].gain > by_chance && fitted[i].lead.term.needs != Needs::Time;
+    let provable = |i: usize| fitted[i].gain > by_chance && !in_time(&fitted[i]);
+    // What is likelier by its own noise alone may predict, but is not named.
+    let predicts = |i: usize| provable(i) || likely[i];
     let mut chosen: Option<&(usize, HeldOut)> = None;
     for candidate @ (i, errors) in &judged {
         let better = match chosen {
-            None => fitted[*i].gain > NEEDED || provable(*i) && explains(errors),
+            None => fitted[*i].gain > NEEDED || predicts(*i) && explains(errors),
             Some((_, best)) => provable(*i) && errors.removed(best) >= EXPLAINED,
         };
         if better {
@@ -158,8 +181,8 @@ fn judge_by_blocks(
     let as_good = |(i, other): &(usize, HeldOut)| {
         provable(*i) && elsewhere(*i, *first) && errors.removed(other) < EXPLAINED
     };
-    let explains = provable(*first) && explains(errors);
-    let proved = explains && !judged.iter().any(as_good);
+    let explains = predicts(*first) && explains(errors);
+    let proved = explains && provable(*first) && !judged.iter().any(as_good);
     let first = *first;
     (fitted[first].explains, fitted[first].proved) = (explains, proved);
     fitted[..=first].rotate_right(1);
@@ -316,7 +339,7 @@ pub(crate) fn search(
             }
         }
         if least_squares {
-            judge_by_blocks(&mut fitted, strongest.1, (&now, &fit), recordings, hold);
+            judge_by_blocks(&mut fitted, strongest.1, (&now, &fit), recordings, &options);
         }
         for &i in &open {
             let trial = fitted.iter().find(|f| f.hypothesis == Some(i));
@@ -395,6 +418,7 @@ pub(crate) fn search(
         held_out: None,
         reacting: vec![],
         misled: false,
+        likelier: None,
         values,
         part: None,
         map: first_map,

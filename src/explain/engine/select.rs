@@ -170,8 +170,11 @@ fn decide(
         };
     }
     let (which, accepted) = chosen;
+    let steps = searches.iter().filter_map(|s| s.steps.first());
+    let likelier = steps.flatten().find(|f| f.likelier).cloned();
     let mut found = searches.swap_remove(which);
     found.keep(accepted);
+    found.likelier = likelier.filter(|_| accepted == 0 && !found.misled);
     settle(&mut found, &rivals, which, judged, recordings);
     Ok(named_alone(&found, recordings, hold).unwrap_or(found))
 }

@@ -33,7 +33,8 @@ use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind
 use super::engine::scope::Scope;
 use super::engine::search::Found;
 use super::engine::select::{CHANCE, select};
-use super::engine::terms::term::{Port, Shape};
+use super::engine::shared_terms::with_shared_terms;
+use super::engine::terms::term::{Needs, Port, Shape};
 use super::engine::thresholds::{LEFT, SURE, chance};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitTable, JointTest,
@@ -64,6 +65,8 @@ pub fn explain_plant(
         ..Scope::new(&options.only, &options.without)?
     };
     let hold = options.hold;
+    let shared = with_shared_terms(&plant.spec).map(Plant::new);
+    let plant = shared.as_ref().unwrap_or(plant);
     let recordings: Vec<PlantRecording> = logs.iter().map(PlantRecording::from).collect();
     let mut found = select(plant, &recordings, hold, &scope)?;
     let base_options = EstimateOptions {
@@ -281,8 +284,11 @@ impl Answer<'_> {
             astray,
             refused,
         });
-        // What is not sure predicts a fresh recording only where it makes blocks left out better, as a name must.
-        let relied_on = verdict != Verdict::Unexplained || effects.is_empty() || better;
+        // What is not sure predicts a fresh recording only where it makes blocks left out better, as a name must. Blocks between others
+        // say nothing of what a load or a parameter does later.
+        let in_time = |f: &Fitted| f.lead.term.needs == Needs::Time && f.lead.term.id != "periodic";
+        let later = self.effects().any(in_time);
+        let relied_on = verdict != Verdict::Unexplained || effects.is_empty() || better && !later;
         if !relied_on {
             summary.push(
                 "It is not sure enough to predict with: `simulate` uses the equations without it."

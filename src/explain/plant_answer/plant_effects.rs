@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use super::Answer;
 use super::formula_in_numbers::{in_numbers, with_short_literals};
 use crate::explain::document::sentences::{number, quantity};
-use crate::explain::engine::fitting::edit::{Place, user_of};
+use crate::explain::engine::fitting::edit::{Place, is_shared_term, user_of};
 use crate::explain::engine::fitting::fitted::Fitted;
 use crate::explain::engine::hypothesis::Hypothesis;
 use crate::explain::engine::screening::curve::Curve;
@@ -33,10 +33,14 @@ impl Answer<'_> {
         let before = self.spec_before(step);
         let id = self.called(before, fitted);
         let at = fitted.lead.place.variable(before);
-        // A parameter acts through the equation that uses it.
+        // A parameter acts through the equation that uses it, and what several rates share through these.
         let entered = match fitted.lead.place {
             Place::Parameter(p) => user_of(before, p),
             _ => at,
+        };
+        let entered = match is_shared_term(before, entered) {
+            true => user_of(before, entered),
+            false => entered,
         };
         let name = |v| before.variable(v).column().to_owned();
         let (at, enters) = (name(at), name(entered));
@@ -65,7 +69,7 @@ impl Answer<'_> {
         };
         let place = match fitted.lead.place {
             Place::Equation(_) if fitted.lead.sensor => format!("the sensor {enters}"),
-            Place::Equation(_) => format!("the equation of {enters}"),
+            Place::Equation(_) => format!("the equation of {at}"),
             Place::Input(_) => format!("the input {enters}"),
             Place::Parameter(_) => format!("the parameter {at}"),
         };

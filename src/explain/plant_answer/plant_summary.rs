@@ -5,13 +5,15 @@ use super::judgement::free_run::{Astray, STRAYS, leaves_half};
 use super::where_to_look::places;
 use super::within_bounds::at_bounds;
 use crate::explain::document::sentences::{number, p_value, quantity};
-use crate::explain::engine::fitting::fitted::TIE;
+use crate::explain::engine::fitting::edit::{is_shared_term, users_of};
+use crate::explain::engine::fitting::fitted::{Fitted, TIE};
 use crate::explain::engine::select::CHANCE;
 use crate::explain::engine::thresholds::{LEFT, NEEDED, SURE};
 use crate::explain::explanation::{
     Alternative, EffectFound, FitSteps, JointTest, OutputFit, ParameterChange, Quantity, Verdict,
 };
 use crate::physics::estimate::PlantRecording;
+use crate::physics::{Equation, VariableId};
 
 /// Rivals that the summary lists.
 const MOST_RIVALS: usize = 4;
@@ -55,6 +57,7 @@ impl Answer<'_> {
         match told.verdict {
             Verdict::Consistent | Verdict::Parameters => {
                 lines.extend(nothing_missing(told, !bounds.determined.is_empty()));
+                lines.extend(self.found.likelier.as_ref().map(|f| self.hidden(f)));
             }
             Verdict::Named | Verdict::Family => {
                 for (effect, fitted) in told.effects.iter().zip(self.effects()) {
@@ -118,6 +121,7 @@ impl Answer<'_> {
                 }
             }
         }
+        lines.extend(self.shared_terms(told.effects));
         lines.extend(changes(told.parameters));
         lines.extend(bounds_in_words(&bounds.determined, told));
         lines.extend((!bounds.undetermined.is_empty()).then(|| {
@@ -143,6 +147,48 @@ impl Answer<'_> {
             )
         }));
         lines
+    }
+}
+
+impl Answer<'_> {
+    /// What stands for terms that several rates share, where effects enter there.
+    fn shared_terms(&self, effects: &[EffectFound]) -> Option<String> {
+        let spec = &self.plant.spec;
+        let named = |v: &VariableId| {
+            let name = &spec.variable(*v).name;
+            is_shared_term(spec, *v) && effects.iter().any(|e| e.sentence.contains(name))
+        };
+        let said = |e: &Equation| {
+            let v = e.unknown.variable();
+            let span = spec.expressions.span(e.right);
+            let name = |v: VariableId| spec.variable(v).name.clone();
+            let users: Vec<String> = users_of(spec, v).into_iter().map(name).collect();
+            let text = &spec.text[span.start..span.end];
+            format!(
+                "{} = {text} of the text is what the equations of {} share.",
+                name(v),
+                users.join(" and ")
+            )
+        };
+        let equations = spec
+            .equations
+            .iter()
+            .filter(|e| named(&e.unknown.variable()));
+        let each: Vec<String> = equations.map(said).collect();
+        (!each.is_empty()).then(|| each.join(" "))
+    }
+
+    /// An effect that makes the residual likelier, each with a noise model of its own, but of which few values are independent: what is
+    /// missing may make them depend on each other.
+    fn hidden(&self, fitted: &Fitted) -> String {
+        format!(
+            "Something may be missing: with the effect `{}`, {}, the residual is likelier as coloured noise, but without it few values \
+             are independent, and they do not prove it (gain {}, needed {}).",
+            self.called(&self.plant.spec, fitted),
+            fitted.candidate.equation,
+            number(fitted.gain),
+            number(NEEDED)
+        )
     }
 }
 

@@ -4,6 +4,7 @@
 //! the same number of fields with the most numbers among them. The header is looked for above them.
 
 use crate::log::Roles;
+use crate::log::roles::is_usual_time;
 use crate::log::text::{Channel, Header, fields, is_missing, is_number};
 use crate::log::time::Format;
 
@@ -117,14 +118,22 @@ pub(crate) fn find(name: &str, lines: &[&str], roles: &Roles) -> Option<Layout> 
         Some(_) => raw.iter().map(|field| Channel::parse(field)).collect(),
         None => raw.iter().map(Channel::new).collect(),
     };
-    // A table that was written with its index, which has no name: `df.to_csv(...)`.
+    // A table that was written with its index, which has no name: `df.to_csv(...)`; or one whose dates have another name.
+    let timeless = roles.time.is_none() && !channels.iter().any(|c| is_usual_time(&c.name));
     if let Some(first) = channels.first_mut()
         && at.is_some()
-        && is_unnamed(&first.name)
-        && holds_times(rows.iter().filter_map(|row| row.first()).copied())
     {
-        said.push("column 1 has no name and is taken as the time".to_owned());
-        first.name = "time".to_owned();
+        let cells = || rows.iter().filter_map(|row| row.first()).copied();
+        if is_unnamed(&first.name) && holds_times(cells()) {
+            said.push("column 1 has no name and is taken as the time".to_owned());
+            first.name = "time".to_owned();
+        } else if timeless && Format::of(cells()).is_some() {
+            said.push(format!(
+                "column `{}` holds dates and is taken as the time",
+                first.name
+            ));
+            first.name = "time".to_owned();
+        }
     }
     if let Some(row) = units.and_then(|at| lines.get(at)) {
         let row = bare(row);

@@ -88,6 +88,17 @@ impl<'a> Study<'a> {
         self.information * fit.deviance + penalty(numbers, values, self.count())
     }
 
+    /// Schwarz's criterion of a least-squares fit under the noise model of its own residual. What a plant leaves out makes its residual
+    /// slow, and few of its values independent: a count of them from there hides what is missing, the more of it the more (T. J.
+    /// Vogelsang, *J. Econometrics* 88, 1999, on tests whose power falls so).
+    pub(crate) fn criterion_in_colour(&self, fit: &Fit) -> Option<f64> {
+        let (residual, mask) = (self.residual(fit)?, &self.problem.mask);
+        let noise = Noise::estimate(&residual, self.outputs(), mask, Colours::All);
+        let numbers = self.problem.nominal().len() + noise.len();
+        let values = self.count();
+        Some(noise.deviance(&residual, mask) + penalty(numbers, values as f64, values))
+    }
+
     /// What a number more adds to the criterion, about.
     pub(crate) fn cost_of_a_number(&self) -> f64 {
         (self.information * self.count() as f64).max(1.0).ln()

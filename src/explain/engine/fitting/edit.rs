@@ -1,9 +1,29 @@
 //! Changes of a plant's text: terms that enter its equations, and the variables and parameters that they need.
 
 use crate::physics::{
-    Binary, ExpressionId, ModelSpec, Node, Span, SpecError, Unknown, VariableId, VariableKind,
-    parse,
+    Binary, Equation, ExpressionId, ModelSpec, Node, Span, SpecError, Unknown, VariableId,
+    VariableKind, parse,
 };
+
+/// Name of a variable for what several rates share.
+pub(in crate::explain::engine) const SHARED_TERM: &str = "shared_term";
+
+/// Whether a variable is one of those.
+pub(crate) fn is_shared_term(spec: &ModelSpec, v: VariableId) -> bool {
+    let variable = spec.variable(v);
+    variable.kind == VariableKind::Algebraic && variable.name.starts_with(SHARED_TERM)
+}
+
+/// The variables whose equations use another, in the order of the text.
+pub(crate) fn users_of(spec: &ModelSpec, v: VariableId) -> Vec<VariableId> {
+    let uses = |e: &&Equation| {
+        let both = [e.left, e.right].map(|side| spec.expressions.variables(side));
+        both.concat().contains(&v) && e.unknown.variable() != v
+    };
+    let mut users: Vec<&Equation> = spec.equations.iter().filter(uses).collect();
+    users.sort_by_key(|e| spec.expressions.span(e.left).start);
+    users.iter().map(|e| e.unknown.variable()).collect()
+}
 
 /// Where something can enter the equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -250,7 +270,11 @@ fn simple(text: &str) -> bool {
 }
 
 /// A part of the text with pieces of it replaced.
-fn substituted(text: &str, part: Span, mut pieces: Vec<(Span, String)>) -> String {
+pub(in crate::explain::engine) fn substituted(
+    text: &str,
+    part: Span,
+    mut pieces: Vec<(Span, String)>,
+) -> String {
     pieces.sort_by_key(|(s, _)| (s.start, s.end));
     let (mut out, mut at) = (String::new(), part.start);
     for (span, new) in pieces {
@@ -271,15 +295,16 @@ pub(crate) fn places(spec: &ModelSpec, given: &ModelSpec) -> Vec<Place> {
     for (at, equation) in spec.equations.iter().enumerate() {
         // A rate that is a number or an input of its own is a law, as is what an output shows of a number.
         let copied = match spec.expressions.node(equation.rest) {
-            Node::Variable(v) => Some(spec.variable(v).kind),
+            Node::Variable(v) => Some(v),
             _ => None,
         };
         let rate = matches!(equation.unknown, Unknown::Derivative(_));
         let plain = equation.coefficient.is_none()
-            && copied.is_some_and(|kind| match kind {
+            && copied.is_some_and(|v| match spec.variable(v).kind {
                 VariableKind::Parameter => false,
                 VariableKind::Input => !rate,
-                _ => true,
+                // A rate that is only what it shares with another.
+                _ => !(rate && is_shared_term(spec, v)),
             });
         let kinematic = matches!(equation.unknown, Unknown::Value(_))
             && equation.coefficient.is_none()
@@ -354,21 +379,10 @@ fn delays(spec: &ModelSpec, parameter: VariableId) -> bool {
 
 /// The variable whose equation uses a parameter first; the parameter itself where none does.
 pub(crate) fn user_of(spec: &ModelSpec, parameter: VariableId) -> VariableId {
-    let spans = uses(spec, parameter);
-    let inside = |at: Span| {
-        let right = spec.equations.iter().map(|e| {
-            (
-                e,
-                spec.expressions.span(e.left),
-                spec.expressions.span(e.right),
-            )
-        });
-        right
-            .filter(|(_, left, right)| left.start <= at.start && at.end <= right.end)
-            .map(|(e, ..)| e.unknown.variable())
-            .next()
-    };
-    spans.into_iter().find_map(inside).unwrap_or(parameter)
+    users_of(spec, parameter)
+        .first()
+        .copied()
+        .unwrap_or(parameter)
 }
 
 /// Whether an input enters at several places at once: what is between them, such as a force between two bodies, acts there too.

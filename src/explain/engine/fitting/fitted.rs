@@ -47,6 +47,8 @@ pub(crate) struct Fitted {
     pub(crate) explains: bool,
     /// ... and off what any other function leaves there.
     pub(crate) proved: bool,
+    /// Whether it gains more than chance does, and surely where each residual has a noise model of its own.
+    pub(crate) likelier: bool,
     /// Place in the user's hypotheses; none for a term of the library.
     pub(crate) hypothesis: Option<usize>,
 }

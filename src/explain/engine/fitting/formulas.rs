@@ -82,7 +82,18 @@ pub(in crate::explain::engine) fn formulas(
             let what = (near.term, best.lead.argument);
             in_its_place(best, what, start, &refit, arguments, ground)
         })
+        .filter(|f| turns_inside(f, arguments))
         .collect()
+}
+
+/// Whether the middle of a formula is among the values of its argument: what rises or falls beyond them is a constant.
+fn turns_inside(fitted: &Fitted, arguments: &[Argument]) -> bool {
+    let shapes = fitted.lead.term.shapes.iter().zip(&fitted.shapes);
+    let mut middles = shapes.filter(|(shape, _)| shape.symbol == "o");
+    let argument = fitted.lead.argument.map(|a| &arguments[a]);
+    argument.is_none_or(|a| {
+        middles.all(|(_, middle)| (a.quantile(0.0)..=a.quantile(1.0)).contains(middle))
+    })
 }
 
 /// The curve of a fit, as its knots have it.
@@ -247,9 +258,30 @@ pub(super) fn in_its_place(
     arguments: &[Argument],
     ground: &Ground,
 ) -> Option<Fitted> {
+    at_place(
+        best,
+        best.lead.place,
+        (term, argument),
+        (shapes, strength),
+        fitted,
+        arguments,
+        ground,
+    )
+}
+
+/// The same at another place.
+pub(super) fn at_place(
+    best: &Fitted,
+    place: Place,
+    (term, argument): (&'static Term, Option<usize>),
+    (shapes, strength): (&[f64], f64),
+    fitted: &dyn Fn(&Study, &Fit) -> Option<Fit>,
+    arguments: &[Argument],
+    ground: &Ground,
+) -> Option<Fitted> {
     let (study, plant) = (ground.study, ground.plant);
-    let mut lead = Lead::untested(term, best.lead.place).at(best.lead.place, argument, shapes);
-    lead.strength = strength;
+    let mut lead = Lead::untested(term, place).at(place, argument, shapes);
+    (lead.strength, lead.sensor) = (strength, term.port == Port::Sensor);
     let made = candidate(&plant.spec, &lead, arguments, ground.recordings)?;
     let options = with_more(ground.options, made.values.len());
     let rough = made.rough(study, MOST_STEPS);

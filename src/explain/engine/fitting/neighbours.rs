@@ -1,33 +1,43 @@
-//! Neighbours of a fit's term: the form with one shape more, and the same function of one variable only.
+//! Neighbours of a fit's term: forms with one shape more, the same function of one variable only, and a change of a parameter.
 
 use rayon::prelude::*;
 
+use crate::explain::engine::fitting::edit::{Place, places};
 use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
-use crate::explain::engine::fitting::formulas::in_its_place;
+use crate::explain::engine::fitting::formulas::{at_place, in_its_place};
 use crate::explain::engine::hypothesis::Ground;
 use crate::explain::engine::terms::argument::Argument;
+use crate::explain::engine::terms::library::TERMS;
 use crate::explain::engine::terms::richer::richer;
+use crate::explain::engine::terms::term::Term;
 use crate::explain::engine::terms::values::starts;
 use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH, limited};
+use crate::physics::ModelSpec;
 use crate::physics::estimate::{Fit, Study};
 
-/// The richer form of a fit's term, where that gains what ties do not explain. What the simple form leaves would else be taken
+/// The richer form of a fit's term that fits best, where that gains what ties do not explain. What the simple form leaves would else be taken
 /// for a second effect.
 pub(in crate::explain::engine) fn richer_form(
     fitted: &Fitted,
     arguments: &[Argument],
     ground: &Ground,
 ) -> Option<Fitted> {
-    let term = richer(fitted.lead.term)?;
-    let argument = &arguments[fitted.lead.argument?];
-    let strength = match term.free_strength {
-        true => fitted.strength(),
-        false => 1.0,
+    let argument = fitted.lead.argument.map(|a| &arguments[a]);
+    let begun = |term: &'static Term| -> Vec<(&'static Term, f64)> {
+        let new = term.shapes.last().map(|shape| shape.starts);
+        let each = new.map(|new| starts(new, argument, ground.recordings, &[]));
+        each.into_iter()
+            .flatten()
+            .map(|start| (term, start))
+            .collect()
     };
-    let new = term.shapes.last()?;
-    let each = starts(new.starts, Some(argument), ground.recordings, &[]);
-    let glanced = each.into_par_iter().filter_map(|start| {
+    let each: Vec<(&Term, f64)> = richer(fitted.lead.term).iter().flat_map(begun).collect();
+    let glanced = each.into_par_iter().filter_map(|(term, start)| {
         let shapes = [&fitted.shapes[..], &[start]].concat();
+        let strength = match term.free_strength {
+            true => fitted.strength(),
+            false => 1.0,
+        };
         let what = (term, fitted.lead.argument);
         in_its_place(
             fitted,
@@ -74,6 +84,57 @@ pub(in crate::explain::engine) fn of_one_variable(
     clearly_better(fitted, glanced, ground)
 }
 
+/// Parts of a parameter by which it may change.
+const CHANGES: [f64; 2] = [-0.3, 0.3];
+
+/// A load that begins at some time, as a change of each parameter of its equation from then on. From the plant without it a fit may not
+/// get there, where parameters have gone to their bounds to make up for it.
+pub(in crate::explain::engine) fn as_parameter_changes(
+    fitted: &Fitted,
+    given: &ModelSpec,
+    arguments: &[Argument],
+    ground: &Ground,
+) -> Vec<Fitted> {
+    let id = match fitted.lead.term.id {
+        "load_step" => "parameter_step",
+        "load_ramp" => "parameter_ramp",
+        _ => return vec![],
+    };
+    let term = TERMS.iter().find(|term| term.id == id);
+    let spec = &ground.plant.spec;
+    let parameters = spec.parameters();
+    let of_equation = |place: &Place| match *place {
+        Place::Parameter(v) => fitted.lead.place.uses(spec, v),
+        _ => false,
+    };
+    let places: Vec<Place> = places(spec, given)
+        .into_iter()
+        .filter(of_equation)
+        .collect();
+    let changed = |(term, place): (&'static Term, Place)| {
+        let at = parameters.iter().position(|&p| p == place.variable(spec))?;
+        let value = *fitted.fit.point.get(at)?;
+        let glanced = CHANGES.into_par_iter().filter_map(|part| {
+            let start = (&fitted.shapes[..], part * value);
+            at_place(
+                fitted,
+                place,
+                (term, None),
+                start,
+                &glance,
+                arguments,
+                ground,
+            )
+        });
+        let best = glanced.min_by(|a, b| a.fit.deviance.total_cmp(&b.fit.deviance))?;
+        thoroughly(best, ground)
+    };
+    let all = term
+        .into_par_iter()
+        .flat_map(|t| places.par_iter().map(move |p| (t, *p)));
+    all.filter_map(changed).collect()
+}
+
 fn glance(study: &Study, from: &Fit) -> Option<Fit> {
     study.glance(from, GLANCE)
 }
@@ -88,16 +149,21 @@ fn clearly_better(
     if best.fit.deviance > fitted.fit.deviance - TIE.0 {
         return None;
     }
-    let options = with_more(ground.options, best.candidate.values.len());
-    let limited = limited(best.candidate.plant.clone(), ground.study, MOST_STEPS);
-    let study = ground.study.of(&limited, &options).ok()?;
-    let fit = study.refit(&best.fit, ROUNDS, THOROUGH)?;
-    let first = ground.study.parameters();
-    let better = Fitted {
-        gain: best.gain + best.fit.criterion - fit.criterion,
-        shapes: fit.point[first..][..best.shapes.len()].to_vec(),
-        fit,
-        ..best
-    };
+    let better = thoroughly(best, ground)?;
     (better.gain > fitted.gain + TIE.0).then_some(better)
+}
+
+/// The same, fitted until nothing changes.
+fn thoroughly(glanced: Fitted, ground: &Ground) -> Option<Fitted> {
+    let options = with_more(ground.options, glanced.candidate.values.len());
+    let limited = limited(glanced.candidate.plant.clone(), ground.study, MOST_STEPS);
+    let study = ground.study.of(&limited, &options).ok()?;
+    let fit = study.refit(&glanced.fit, ROUNDS, THOROUGH)?;
+    let first = ground.study.parameters();
+    Some(Fitted {
+        gain: glanced.gain + glanced.fit.criterion - fit.criterion,
+        shapes: fit.point[first..][..glanced.shapes.len()].to_vec(),
+        fit,
+        ..glanced
+    })
 }

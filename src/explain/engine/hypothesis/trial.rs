@@ -154,6 +154,7 @@ impl Hypothesis {
             hypothesis: Some(which),
             explains: false,
             proved: false,
+            likelier: false,
         })
     }
 

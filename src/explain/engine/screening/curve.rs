@@ -16,7 +16,7 @@ use crate::physics::{ModelSpec, Unknown, VariableKind};
 const KNOTS: usize = 9;
 /// Knots that are nearer than this part of the range are one.
 const NEAREST: f64 = 0.03;
-/// Places and arguments that are tried: those of the best terms in equations, and of the best at inputs.
+/// Places and arguments that are tried: those of the best terms in equations, of the best at inputs, and at parameters.
 const PAIRS: usize = 2;
 /// Characteristics of the plant that are tried as curves.
 const CHARACTERISTICS: usize = 3;
@@ -145,7 +145,7 @@ pub(in crate::explain::engine) fn curves(
         pairs.truncate(PAIRS);
         pairs
     };
-    let mut pairs: Vec<(Place, usize)> = [Port::Input, Port::Equation]
+    let mut pairs: Vec<(Place, usize)> = [Port::Input, Port::Equation, Port::Parameter]
         .into_iter()
         .flat_map(at_port)
         .collect();

@@ -27,6 +27,10 @@ pub(super) const STICTION: Shape = shape(
     Starts::Releases(&[0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0]),
     true,
 );
+pub(super) const DEAD_ZONE: Shape = shape("d", Starts::SizeQuantiles(&[0.1, 0.3, 0.5]), true);
+/// A limit on both sides, and an upper one.
+pub(super) const LIMIT: Shape = shape("L", Starts::SizeQuantiles(&[0.6, 0.8, 0.9, 0.97]), true);
+pub(super) const UPPER_LIMIT: Shape = shape("L", Starts::Quantiles(&[0.6, 0.8, 0.9, 0.97]), false);
 pub(super) const STOP: Shape = shape("o", Starts::Releases(&[0.03, 0.1]), true);
 pub(super) const HYSTERESIS: Shape = shape("w", Starts::Spread(&[0.1, 0.3, 1.0]), true);
 
@@ -296,7 +300,13 @@ pub(crate) const TERMS: &[Term] = &[
         "({z} - {usual})",
         &[],
     ),
-    curve("parameter_square", Parameter, Anything, "{z}^2", &[]),
+    curve(
+        "parameter_square",
+        Parameter,
+        Anything,
+        "({z}^2 - {usual}^2)",
+        &[],
+    ),
     curve(
         "parameter_step",
         Parameter,
@@ -326,11 +336,7 @@ pub(crate) const TERMS: &[Term] = &[
         needs: BothSigns,
         form: "min(max({z}, -{L}), {L}) - {z}",
         memories: &[],
-        shapes: &[shape(
-            "L",
-            Starts::SizeQuantiles(&[0.6, 0.8, 0.9, 0.97]),
-            true,
-        )],
+        shapes: &[LIMIT],
         free_strength: false,
         symbol: "",
         units: &[],
@@ -341,7 +347,7 @@ pub(crate) const TERMS: &[Term] = &[
         needs: Anything,
         form: "min({z}, {L}) - {z}",
         memories: &[],
-        shapes: &[shape("L", Starts::Quantiles(&[0.6, 0.8, 0.9, 0.97]), false)],
+        shapes: &[UPPER_LIMIT],
         free_strength: false,
         symbol: "",
         units: &[],
@@ -363,7 +369,7 @@ pub(crate) const TERMS: &[Term] = &[
         needs: BothSigns,
         form: "-min(max({z}, -{d}), {d})",
         memories: &[],
-        shapes: &[shape("d", Starts::SizeQuantiles(&[0.1, 0.3, 0.5]), true)],
+        shapes: &[DEAD_ZONE],
         free_strength: false,
         symbol: "",
         units: &[],

@@ -1,49 +1,132 @@
 //! Forms of terms with one shape more, where their physics has one.
 
-use super::library::{ABOVE, BACKLASH, BELOW, HYSTERESIS, STICTION, STOP, hysteresis};
-use super::term::Needs::{Anything, BothSigns};
-use super::term::Port::Equation;
+use super::library::{
+    ABOVE, BACKLASH, BELOW, DEAD_ZONE, HYSTERESIS, LIMIT, STICTION, STOP, UPPER_LIMIT, hysteresis,
+};
+use super::term::Needs::{self, Anything, BothSigns, Time};
+use super::term::Port::{Equation, Input, Parameter, Sensor};
 use super::term::{Memory, MemoryStart, Shape, Starts, Term, curve, in_place, sampled, shape};
 
-/// The form of a term with one shape more: a contact has damping in proportion to its depth (K. H. Hunt and F. R. E. Crossley,
-/// *J. Appl. Mech.* 42, 1975), and an actuator with play, stiction or hysteresis a lag. It keeps the name.
-pub(in crate::explain::engine) fn richer(term: &Term) -> Option<&'static Term> {
-    match term.id {
-        "above" => Some(&ABOVE_DAMPED),
-        "below" => Some(&BELOW_DAMPED),
-        "both_sides" => Some(&BOTH_SIDES_DAMPED),
-        "input_backlash" => Some(&BACKLASH_LAGGING),
-        "valve_stiction" if term.shapes.len() == 1 => Some(&SLIP_LAGGING),
-        "valve_stiction" => Some(&STICTION_LAGGING),
-        "input_hysteresis" => Some(&HYSTERESIS_LAGGING),
-        _ => None,
+/// The forms of a term with one shape more: a contact has damping in proportion to its depth (K. H. Hunt and F. R. E. Crossley,
+/// *J. Appl. Mech.* 42, 1975), a flow over a crest a power of its height (3/2 over a weir), and an actuator with play, stiction or
+/// hysteresis a lag; the two sides of limits and dead zones differ, and a ramp begins later than the recording. They keep the name.
+pub(in crate::explain::engine) fn richer(term: &Term) -> &'static [Term] {
+    match (term.id, term.shapes) {
+        ("above", _) => ABOVE_MORE,
+        ("below", _) => BELOW_MORE,
+        ("both_sides", _) => BOTH_SIDES_MORE,
+        ("load_ramp", _) => LOAD_LATER,
+        ("parameter_ramp", _) => PARAMETER_LATER,
+        ("sensor_drift", _) => DRIFT_LATER,
+        ("input_dead_zone", _) => DEAD_ZONE_OF_TWO,
+        ("input_saturation", [LIMIT]) => LIMITS_OF_TWO,
+        ("input_saturation", [UPPER_LIMIT]) => UPPER_AND_LOWER,
+        ("input_backlash", _) => BACKLASH_LAGGING,
+        ("valve_stiction", [_]) => SLIP_LAGGING,
+        ("valve_stiction", _) => STICTION_LAGGING,
+        ("input_hysteresis", _) => HYSTERESIS_LAGGING,
+        _ => &[],
     }
 }
 
 /// Speed at which damping doubles the force of a contact.
 const DAMPING: Shape = shape("V", Starts::RateSize(&[1.0, 4.0]), true);
 
-const ABOVE_DAMPED: Term = curve(
-    "above",
-    Equation,
-    Anything,
-    "max({z} - {from}, 0)*max({V} + {dz}, 0)/{V}",
-    &[shape("from", Starts::Quantiles(ABOVE), false), DAMPING],
+/// Power of a height over a crest.
+const POWER: Shape = shape("p", Starts::Values(&[1.5]), true);
+/// The other side of two that differ.
+const OTHER: Shape = shape(
+    "other",
+    Starts::SizeQuantiles(&[0.1, 0.3, 0.5, 0.7, 0.9]),
+    true,
 );
-const BELOW_DAMPED: Term = curve(
+/// When a ramp begins.
+const BEGIN: Shape = shape("t0", Starts::Instants(&[0.1, 0.3, 0.5, 0.7]), false);
+const LATER: &str = "max(time - {t0}, 0)";
+
+const ABOVE_MORE: &[Term] = &[
+    curve(
+        "above",
+        Equation,
+        Anything,
+        "max({z} - {from}, 0)*max({V} + {dz}, 0)/{V}",
+        &[shape("from", Starts::Quantiles(ABOVE), false), DAMPING],
+    ),
+    curve(
+        "above",
+        Equation,
+        Anything,
+        "max({z} - {from}, 0)^{p}",
+        &[shape("from", Starts::Quantiles(ABOVE), false), POWER],
+    ),
+];
+const BELOW_MORE: &[Term] = &[curve(
     "below",
     Equation,
     Anything,
     "min({z} - {from}, 0)*max({V} - {dz}, 0)/{V}",
     &[shape("from", Starts::Quantiles(BELOW), false), DAMPING],
-);
-const BOTH_SIDES_DAMPED: Term = curve(
-    "both_sides",
-    Equation,
+)];
+const BOTH_SIDES_MORE: &[Term] = &[
+    curve(
+        "both_sides",
+        Equation,
+        BothSigns,
+        "(max({z} - {from}, 0)*max({V} + {dz}, 0) + min({z} + {from}, 0)*max({V} - {dz}, 0))/{V}",
+        &[shape("from", Starts::SizeQuantiles(ABOVE), true), DAMPING],
+    ),
+    curve(
+        "both_sides",
+        Equation,
+        BothSigns,
+        "max({z} - {from}, 0) + min({z} + {other}, 0)",
+        &[shape("from", Starts::SizeQuantiles(ABOVE), true), OTHER],
+    ),
+];
+const LOAD_LATER: &[Term] = &[curve("load_ramp", Equation, Time, LATER, &[BEGIN])];
+const PARAMETER_LATER: &[Term] = &[curve("parameter_ramp", Parameter, Time, LATER, &[BEGIN])];
+const DRIFT_LATER: &[Term] = &[curve("sensor_drift", Sensor, Time, LATER, &[BEGIN])];
+
+const fn limits(
+    id: &'static str,
+    form: &'static str,
+    shapes: &'static [Shape],
+    needs: Needs,
+) -> Term {
+    Term {
+        id,
+        port: Input,
+        needs,
+        form,
+        memories: &[],
+        shapes,
+        free_strength: false,
+        symbol: "",
+        units: &[],
+    }
+}
+
+const DEAD_ZONE_OF_TWO: &[Term] = &[limits(
+    "input_dead_zone",
+    "-min(max({z}, -{d}), {other})",
+    &[DEAD_ZONE, OTHER],
     BothSigns,
-    "(max({z} - {from}, 0)*max({V} + {dz}, 0) + min({z} + {from}, 0)*max({V} - {dz}, 0))/{V}",
-    &[shape("from", Starts::SizeQuantiles(ABOVE), true), DAMPING],
-);
+)];
+const LIMITS_OF_TWO: &[Term] = &[limits(
+    "input_saturation",
+    "min(max({z}, -{L}), {other}) - {z}",
+    &[LIMIT, OTHER],
+    BothSigns,
+)];
+const UPPER_AND_LOWER: &[Term] = &[limits(
+    "input_saturation",
+    "min(max({z}, {lower}), {L}) - {z}",
+    &[
+        UPPER_LIMIT,
+        shape("lower", Starts::Quantiles(&[0.03, 0.1, 0.2]), false),
+    ],
+    Anything,
+)];
 
 const LAG_TIME: Shape = shape("T", Starts::Samples(&[0.3, 1.0]), true);
 /// Follows the second memory.
@@ -53,25 +136,25 @@ const LAG: Memory = Memory {
     sampled: false,
 };
 
-const BACKLASH_LAGGING: Term = in_place(
+const BACKLASH_LAGGING: &[Term] = &[in_place(
     "input_backlash",
     &[LAG, sampled("min(max({p}, {z} - {g}), {z} + {g})")],
     &[BACKLASH, LAG_TIME],
-);
-const SLIP_LAGGING: Term = in_place(
+)];
+const SLIP_LAGGING: &[Term] = &[in_place(
     "valve_stiction",
     &[LAG, sampled("if abs({z} - {p}) > {S} then {z} else {p}")],
     &[STICTION, LAG_TIME],
-);
-const STICTION_LAGGING: Term = in_place(
+)];
+const STICTION_LAGGING: &[Term] = &[in_place(
     "valve_stiction",
     &[
         LAG,
         sampled("if abs({z} - {p}) > {S} then {z} - {o}*sign({z} - {p}) else {p}"),
     ],
     &[STICTION, STOP, LAG_TIME],
-);
-const HYSTERESIS_LAGGING: Term = hysteresis(
+)];
+const HYSTERESIS_LAGGING: &[Term] = &[hysteresis(
     &[
         Memory {
             start: MemoryStart::Zero,
@@ -85,7 +168,7 @@ const HYSTERESIS_LAGGING: Term = hysteresis(
         sampled("{z}"),
     ],
     &[HYSTERESIS, LAG_TIME],
-);
+)];
 
 #[cfg(test)]
 mod tests {
@@ -95,22 +178,20 @@ mod tests {
     /// The shapes that a fit of the simple form has are those that the richer one begins with.
     #[test]
     fn a_richer_form_has_one_shape_more() {
-        let pairs = TERMS.iter().filter_map(|t| Some((t, richer(t)?)));
+        let pairs = TERMS
+            .iter()
+            .flat_map(|t| richer(t).iter().map(move |r| (t, r)));
         let mut count = 0;
         for (simple, richer) in pairs {
             let (last, others) = richer.shapes.split_last().unwrap();
             assert_eq!(others, simple.shapes, "{}", simple.id);
-            assert!(
-                richer.form.contains(&format!("{{{}}}", last.symbol))
-                    || richer
-                        .memories
-                        .iter()
-                        .any(|m| m.rate.contains(&format!("{{{}}}", last.symbol)))
-            );
+            let name = format!("{{{}}}", last.symbol);
+            let remembers = richer.memories.iter().any(|m| m.rate.contains(&name));
+            assert!(richer.form.contains(&name) || remembers, "{}", simple.id);
             let of = |t: &Term| (t.id, t.port, t.needs, t.free_strength, t.symbol);
             assert_eq!(of(richer), of(simple));
             count += 1;
         }
-        assert_eq!(count, 7);
+        assert_eq!(count, 15);
     }
 }

@@ -1,0 +1,337 @@
+//! Terms that stand in several equations, such as a force and its reaction or the heat that one body gives another, as variables of
+//! their own: what is missing there enters all of them.
+
+use super::fitting::candidate::free_name;
+use super::fitting::edit::{Edit, Place, SHARED_TERM, substituted};
+use crate::physics::{
+    Binary, ExpressionId, Function, ModelSpec, Node, Span, Unknown, VariableId, VariableKind,
+};
+
+/// Most variables that a plant gets.
+const MOST: usize = 8;
+
+/// The plant with a variable for terms that several rates share; none where there are no such terms.
+pub(crate) fn with_shared_terms(spec: &ModelSpec) -> Option<ModelSpec> {
+    let mut found: Option<ModelSpec> = None;
+    for _ in 0..MOST {
+        match shared(found.as_ref().unwrap_or(spec)) {
+            Some(next) => found = Some(next),
+            None => break,
+        }
+    }
+    found
+}
+
+/// A term of a sum: its sign, an expression that is the same for the same term in another order, and its text.
+struct Part {
+    sign: f64,
+    key: String,
+    text: String,
+    /// More than a name, and no number.
+    counts: bool,
+}
+
+/// A sum in the right-hand side of an equation.
+struct Sum {
+    equation: usize,
+    span: Span,
+    parts: Vec<Part>,
+}
+
+impl Sum {
+    /// The terms that another has as well, all with the same or all with the other sign: the more of them.
+    fn common(&self, other: &Self) -> Vec<&Part> {
+        let with = |relation: f64| -> Vec<&Part> {
+            let same = |a: &Part, b: &Part| a.key == b.key && a.sign * b.sign == relation;
+            let parts = self.parts.iter();
+            parts
+                .filter(|a| other.parts.iter().any(|b| same(a, b)))
+                .collect()
+        };
+        let (same, opposite) = (with(1.0), with(-1.0));
+        let common = match same.len() > opposite.len() {
+            true => same,
+            false => opposite,
+        };
+        match common.iter().any(|p| p.counts) {
+            true => common,
+            false => vec![],
+        }
+    }
+
+    /// The text with a variable in the place of these terms; none where it lacks one, or has them with different signs.
+    fn with(&self, terms: &[&Part], name: &str) -> Option<String> {
+        let of = |term: &&Part| self.parts.iter().find(|p| p.key == term.key);
+        let signs = terms.iter().map(|t| Some(of(t)?.sign * t.sign));
+        let signs: Vec<f64> = signs.collect::<Option<_>>()?;
+        let sign = *signs.first()?;
+        if signs.iter().any(|s| *s != sign) {
+            return None;
+        }
+        let others = self.parts.iter();
+        let others = others.filter(|p| !terms.iter().any(|t| t.key == p.key));
+        let mut each: Vec<(f64, &str)> = others.map(|p| (p.sign, p.text.as_str())).collect();
+        each.push((sign, name));
+        Some(match (&self.parts[..], &each[..]) {
+            ([_], [(s, only)]) if *s < 0.0 => format!("(-{only})"),
+            _ => sum_text(&each),
+        })
+    }
+}
+
+fn sum_text(parts: &[(f64, &str)]) -> String {
+    let mut text = String::new();
+    for (i, (sign, part)) in parts.iter().enumerate() {
+        text.push_str(match (i, *sign < 0.0) {
+            (0, false) => "",
+            (0, true) => "-",
+            (_, false) => " + ",
+            (_, true) => " - ",
+        });
+        text.push_str(part);
+    }
+    text
+}
+
+/// The plant with one variable more, for the largest group of terms that two rates share.
+fn shared(spec: &ModelSpec) -> Option<ModelSpec> {
+    let sums = sums(spec);
+    let mut best: Vec<&Part> = vec![];
+    for (i, a) in sums.iter().enumerate() {
+        for b in sums[i + 1..].iter().filter(|b| b.equation != a.equation) {
+            let common = a.common(b);
+            if common.len() > best.len() {
+                best = common;
+            }
+        }
+    }
+    if best.is_empty() {
+        return None;
+    }
+    let name = free_name(spec, SHARED_TERM);
+    let parts: Vec<(f64, &str)> = best.iter().map(|p| (p.sign, p.text.as_str())).collect();
+    let mut edit = Edit {
+        declarations: vec![format!("Real {name};")],
+        equations: vec![format!("{name} = {};", sum_text(&parts))],
+        ..Edit::default()
+    };
+    for at in 0..spec.equations.len() {
+        let of_equation = sums.iter().filter(|s| s.equation == at);
+        let pieces = of_equation.filter_map(|s| Some((s.span, s.with(&best, &name)?)));
+        let pieces: Vec<(Span, String)> = pieces.collect();
+        if !pieces.is_empty() {
+            let right = spec.expressions.span(spec.equations[at].right);
+            let text = substituted(&spec.text, right, pieces);
+            edit.changes.push((Place::Equation(at), text));
+        }
+    }
+    edit.apply(spec).ok()
+}
+
+/// The sums of all rates.
+fn sums(spec: &ModelSpec) -> Vec<Sum> {
+    let mut found = Vec::new();
+    for (equation, e) in spec.equations.iter().enumerate() {
+        if !matches!(e.unknown, Unknown::Derivative(_)) {
+            continue;
+        }
+        let mut waiting = vec![e.right];
+        while let Some(id) = waiting.pop() {
+            let node = spec.expressions.node(id);
+            match node {
+                Node::Binary(Binary::Divide, a, _) => waiting.push(a),
+                Node::Binary(Binary::Multiply, a, b) if is_sum(spec, a) != is_sum(spec, b) => {
+                    waiting.push(if is_sum(spec, a) { a } else { b });
+                }
+                _ => {
+                    let mut parts = Vec::new();
+                    flatten(spec, id, 1.0, &mut parts);
+                    let parts = parts.into_iter().map(|(sign, id)| part(spec, sign, id));
+                    found.push(Sum {
+                        equation,
+                        span: spec.expressions.span(id),
+                        parts: parts.collect(),
+                    });
+                }
+            }
+        }
+    }
+    found
+}
+
+fn is_sum(spec: &ModelSpec, id: ExpressionId) -> bool {
+    let node = spec.expressions.node(id);
+    matches!(node, Node::Binary(Binary::Add | Binary::Subtract, _, _))
+}
+
+fn flatten(spec: &ModelSpec, id: ExpressionId, sign: f64, parts: &mut Vec<(f64, ExpressionId)>) {
+    match spec.expressions.node(id) {
+        Node::Negate(a) => flatten(spec, a, -sign, parts),
+        Node::Binary(Binary::Add, a, b) => {
+            flatten(spec, a, sign, parts);
+            flatten(spec, b, sign, parts);
+        }
+        Node::Binary(Binary::Subtract, a, b) => {
+            flatten(spec, a, sign, parts);
+            flatten(spec, b, -sign, parts);
+        }
+        _ => parts.push((sign, id)),
+    }
+}
+
+fn part(spec: &ModelSpec, sign: f64, id: ExpressionId) -> Part {
+    let span = spec.expressions.span(id);
+    let text = &spec.text[span.start..span.end];
+    let open = text.starts_with('-') || text.contains("if ");
+    let (own, key) = canonical(spec, id);
+    let moves = |v: &VariableId| {
+        let kind = spec.variable(*v).kind;
+        !matches!(kind, VariableKind::Parameter | VariableKind::Constant)
+    };
+    let text = match open {
+        true => format!("({text})"),
+        false => text.to_owned(),
+    };
+    let (text, sign) = match own < 0.0 {
+        // The same text for both: that of the canonical sign.
+        true => (format!("(-{text})"), -sign),
+        false => (text, sign),
+    };
+    Part {
+        sign,
+        key,
+        text,
+        counts: !matches!(spec.expressions.node(id), Node::Variable(_))
+            && spec.expressions.variables(id).iter().any(moves),
+    }
+}
+
+/// An expression as text in which sums and products have an order, and its sign.
+fn canonical(spec: &ModelSpec, id: ExpressionId) -> (f64, String) {
+    let of = |id: ExpressionId| {
+        let (sign, key) = canonical(spec, id);
+        format!("{}{key}", if sign < 0.0 { "-" } else { "" })
+    };
+    match spec.expressions.node(id) {
+        Node::Number(v) => (v.signum(), format!("{:e}", v.abs())),
+        Node::Negate(a) => {
+            let (sign, key) = canonical(spec, a);
+            (-sign, key)
+        }
+        Node::Binary(Binary::Add | Binary::Subtract, _, _) => {
+            let mut parts = Vec::new();
+            flatten(spec, id, 1.0, &mut parts);
+            let mut each: Vec<(String, f64)> = Vec::new();
+            for (sign, part) in parts {
+                let (own, key) = canonical(spec, part);
+                each.push((key, sign * own));
+            }
+            each.sort_by(|a, b| a.0.cmp(&b.0));
+            let first = each.first().map_or(1.0, |e| e.1);
+            let signed = |(key, sign): &(String, f64)| match sign * first < 0.0 {
+                true => format!("-{key}"),
+                false => format!("+{key}"),
+            };
+            let text: String = each.iter().map(signed).collect();
+            (first, format!("({text})"))
+        }
+        Node::Binary(Binary::Multiply | Binary::Divide, _, _) => {
+            let mut sign = 1.0;
+            let mut factors = Vec::new();
+            let mut waiting = vec![(id, false)];
+            while let Some((id, below)) = waiting.pop() {
+                match spec.expressions.node(id) {
+                    Node::Binary(Binary::Multiply, a, b) => {
+                        waiting.extend([(a, below), (b, below)]);
+                    }
+                    Node::Binary(Binary::Divide, a, b) => {
+                        waiting.extend([(a, below), (b, !below)]);
+                    }
+                    _ => {
+                        let (own, key) = canonical(spec, id);
+                        sign *= own;
+                        factors.push(format!("{}{key}", if below { '/' } else { '*' }));
+                    }
+                }
+            }
+            factors.sort_unstable();
+            (sign, factors.concat())
+        }
+        Node::Call(Function::Abs, a) => (1.0, format!("abs({})", canonical(spec, a).1)),
+        Node::Variable(v) => (1.0, spec.variable(v).name.clone()),
+        node => {
+            let kind = match node {
+                Node::Call(function, _) => format!("{function:?}"),
+                Node::Binary(operator, _, _) => format!("{operator:?}"),
+                Node::If { .. } => "if".to_owned(),
+                Node::Delay { .. } => "delay".to_owned(),
+                other => format!("{other:?}"),
+            };
+            let operands: Vec<String> = node.operands().map(of).collect();
+            (1.0, format!("{kind}({})", operands.join(",")))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::parse;
+
+    fn made(equations: &str) -> Option<String> {
+        let text = format!(
+            "model M parameter Real k = 1; parameter Real c = 1; parameter Real m = 2; parameter Real n = 3; input Real u; output Real y;
+             Real s; Real v; Real w; equation {equations} y = s; end M;"
+        );
+        let spec = with_shared_terms(&parse(&text).unwrap())?;
+        let all = spec.equations.iter();
+        let all = all.map(|e| {
+            let [l, r] = [e.left, e.right].map(|id| spec.expressions.span(id));
+            format!(
+                "{} = {}",
+                &spec.text[l.start..l.end],
+                &spec.text[r.start..r.end]
+            )
+        });
+        let mut all: Vec<String> = all.collect();
+        all.sort();
+        Some(all.join("; "))
+    }
+
+    #[test]
+    fn a_force_and_its_reaction_are_one_variable() {
+        let found = made(
+            "der(s) = v - w; m*der(v) = u - k*s - c*(v - w); der(w) = (s*k - (w - v)*c - n*w)/n;",
+        );
+        let expected = "der(s) = v - w; der(w) = (-n*w + shared_term)/n; m*der(v) = u - shared_term; \
+                        shared_term = k*s + c*(v - w); y = s";
+        let found = found.unwrap();
+        let mean = |text: &str| {
+            parse(&format!("model M parameter Real k = 1; parameter Real c = 1; parameter Real m = 2; parameter Real n = 3;
+            input Real u; output Real y; Real s; Real v; Real w; Real shared_term; equation {text}; end M;"))
+        };
+        assert!(mean(&found).is_ok() && mean(expected).is_ok(), "{found}");
+        assert_eq!(found.matches("shared_term").count(), 3, "{found}");
+        assert!(
+            found.contains("u - shared_term") || found.contains("u + shared_term"),
+            "{found}"
+        );
+    }
+
+    #[test]
+    fn what_stands_once_and_names_alone_stay() {
+        assert_eq!(
+            made("der(s) = v; m*der(v) = u - k*s; n*der(w) = u - c*w;"),
+            None
+        );
+    }
+
+    #[test]
+    fn a_heat_between_two_bodies_leaves_a_place_in_each() {
+        let found =
+            made("der(s) = u - k*(s - v); der(v) = k*(s - v) - c*(v - w); der(w) = c*(v - w);");
+        let found = found.unwrap();
+        assert_eq!(found.matches("shared_term2").count(), 3, "{found}");
+        assert!(found.contains("der(w) = shared_term"), "{found}");
+    }
+}
