@@ -60,14 +60,14 @@ impl Sum {
     }
 
     /// The text with a variable in the place of these terms; none where it lacks one, or has them with different signs.
-    fn with(&self, terms: &[&Part], name: &str) -> Option<String> {
+    fn with(&self, terms: &[&Part], (first, name): (f64, &str)) -> Option<String> {
         let of = |term: &&Part| self.parts.iter().find(|p| p.key == term.key);
         let signs = terms.iter().map(|t| Some(of(t)?.sign * t.sign));
         let signs: Vec<f64> = signs.collect::<Option<_>>()?;
-        let sign = *signs.first()?;
-        if signs.iter().any(|s| *s != sign) {
+        if signs.iter().any(|s| *s != signs[0]) {
             return None;
         }
+        let sign = first * signs.first()?;
         let others = self.parts.iter();
         let others = others.filter(|p| !terms.iter().any(|t| t.key == p.key));
         let mut each: Vec<(f64, &str)> = others.map(|p| (p.sign, p.text.as_str())).collect();
@@ -105,11 +105,11 @@ fn shared(spec: &ModelSpec) -> Option<ModelSpec> {
             }
         }
     }
-    if best.is_empty() {
-        return None;
-    }
+    // As a sum that begins with a plus.
+    let first = best.first()?.sign;
     let name = free_name(spec, SHARED_TERM);
-    let parts: Vec<(f64, &str)> = best.iter().map(|p| (p.sign, p.text.as_str())).collect();
+    let parts = best.iter().map(|p| (first * p.sign, p.text.as_str()));
+    let parts: Vec<(f64, &str)> = parts.collect();
     let mut edit = Edit {
         declarations: vec![format!("Real {name};")],
         equations: vec![format!("{name} = {};", sum_text(&parts))],
@@ -117,7 +117,7 @@ fn shared(spec: &ModelSpec) -> Option<ModelSpec> {
     };
     for at in 0..spec.equations.len() {
         let of_equation = sums.iter().filter(|s| s.equation == at);
-        let pieces = of_equation.filter_map(|s| Some((s.span, s.with(&best, &name)?)));
+        let pieces = of_equation.filter_map(|s| Some((s.span, s.with(&best, (first, &name))?)));
         let pieces: Vec<(Span, String)> = pieces.collect();
         if !pieces.is_empty() {
             let right = spec.expressions.span(spec.equations[at].right);

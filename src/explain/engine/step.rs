@@ -24,6 +24,9 @@ use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{ModelSpec, Plant};
 
+/// Part of the best gain that a term has whose richer forms are tried.
+const RICHER: f64 = 0.5;
+
 fn promising(screen: &Screen, spec: &ModelSpec, more: usize) -> Vec<Lead> {
     let mut kept: Vec<Lead> = Vec::new();
     for lead in &screen.leads {
@@ -248,6 +251,21 @@ pub(super) fn step(stage: &Stage) -> Step {
             drop_alike(screen, &plant.spec, (first, named(given, first)));
         }
     }
+    // A parameter that has gone to a bound to make up for what is missing stays there while a term is weak.
+    let off_bounds = |from: &Fit| {
+        let (inside, nominal) = (study.inside(from), study.nominal());
+        let own = given.parameters().len();
+        let mut point = from.point.clone();
+        let mut moved = false;
+        for i in (0..own).filter(|i| !inside.contains(i)) {
+            moved |= point[i] != nominal[i];
+            point[i] = nominal[i];
+        }
+        moved.then(|| Fit {
+            point,
+            ..from.clone()
+        })
+    };
     let more = times_more(study.count().max(study.samples()));
     let mut glanced: Vec<(f64, Lead, usize, Candidate, Fit)> = tried
         .iter()
@@ -273,7 +291,7 @@ pub(super) fn step(stage: &Stage) -> Step {
                 0 => inner.glance(start, GLANCE),
                 _ => inner.refit(start, 0, GLANCE),
             };
-            let text = of_text(from).filter(|_| more > 1);
+            let text = of_text(from).filter(|_| more > 1).or_else(|| off_bounds(from));
             let otherwise = text.and_then(|text| glance(&made.from(&text, parameters)));
             let fitted = (glance(&start).into_iter().chain(otherwise))
                 .min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
@@ -381,13 +399,19 @@ pub(super) fn step(stage: &Stage) -> Step {
         fitted.extend(better);
     }
     if let Some((screen, _)) = tried.first() {
-        let close = |f: &&mut Fitted| f.gain > (1.0 - TIE.1) * best && f.hypothesis.is_none();
-        let gain = |a: &&mut Fitted, b: &&mut Fitted| a.gain.total_cmp(&b.gain);
-        if let Some(one) = fitted.iter_mut().filter(close).max_by(gain)
-            && let Some(better) = richer_form(one, &screen.arguments, &ground)
-                .or_else(|| of_one_variable(one, &screen.arguments, &ground))
-        {
-            *one = better;
+        let mut best_first: Vec<usize> = (0..fitted.len())
+            .filter(|&i| fitted[i].hypothesis.is_none() && fitted[i].gain > RICHER * best)
+            .collect();
+        best_first.sort_by(|&a, &b| fitted[b].gain.total_cmp(&fitted[a].gain));
+        for (rank, &i) in best_first.iter().take(FINISHED).enumerate() {
+            let one = &fitted[i];
+            let better = richer_form(one, &screen.arguments, &ground);
+            let close = rank == 0 && one.gain > (1.0 - TIE.1) * best;
+            let of_one = || of_one_variable(one, &screen.arguments, &ground);
+            let better = better.or_else(|| close.then(of_one).flatten());
+            if let Some(better) = better {
+                fitted[i] = better;
+            }
         }
         let one = fitted.iter().filter(|f| f.hypothesis.is_none());
         if let Some(one) = one.max_by(|a, b| a.gain.total_cmp(&b.gain)) {
@@ -402,6 +426,11 @@ pub(super) fn step(stage: &Stage) -> Step {
         }
     }
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    if std::env::var("STEPDBG").is_ok() {
+        eprintln!("STEP accepted {accepted} needed {needed:.1} strongest {:?} info {:.4} fit {:.2?}", strongest, study.information(), &fit.point);
+        for (s, _) in &tried { eprintln!("  leads {} curves {} best {:?}", s.leads.len(), s.curves.len(), s.leads.iter().take(5).map(|l| (l.term.id, l.statistic as i64)).collect::<Vec<_>>()); }
+        for f in fitted.iter().take(8) { eprintln!("  {:.1} {} {:.3?}", f.gain, f.candidate.equation.chars().take(120).collect::<String>(), f.fit.point); }
+    }
     order(&plant.spec, &mut fitted);
     Step {
         fitted,

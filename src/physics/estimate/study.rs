@@ -11,6 +11,8 @@ use super::{EstimateOptions, Fit, Form, SEARCH, best_fit};
 use crate::noise::{Colours, Mask, Noise, Series, effective_samples};
 use crate::physics::simulation::{Hold, Observer, Plan, Plant, Point, Trajectory};
 
+/// Part of the information of single numbers below which a direction changes no prediction: the accuracy of derivatives, squared.
+const UNCHANGED: f64 = 1e-9;
 /// A free run whose error is more than twice that of an observer strays: the logarithm of the ratio of their variances.
 const STRAYS: f64 = 1.386;
 
@@ -295,6 +297,27 @@ impl<'a> Study<'a> {
         let covariances =
             Deviance::new(&self.problem, fit.form, fit.noise.clone()).covariances(&fit.point);
         covariances.joint / self.information
+    }
+
+    /// By how many standard deviations a number differs from 0 with all others free, whatever their bounds, but for directions in which
+    /// no prediction changes: of numbers with a common scale only the ratios are known, and these may be known well.
+    pub(crate) fn deviations_from_zero(&self, fit: &Fit, number: usize) -> Option<f64> {
+        let mut objective = Deviance::new(&self.problem, fit.form, fit.noise.clone());
+        let mut relative = objective.derivatives(&fit.point)?;
+        for (mut column, value) in relative.column_iter_mut().zip(&fit.point) {
+            column *= if *value == 0.0 { 1.0 } else { value.abs() };
+        }
+        let normal = relative.tr_mul(&relative);
+        let size = normal.diagonal().map(|d| d.sqrt().max(f64::MIN_POSITIVE));
+        let scaled = normal.component_div(&(&size * size.transpose()));
+        let eigen = scaled.symmetric_eigen();
+        let known = eigen.eigenvalues.iter().enumerate();
+        let variance: f64 = known
+            .filter(|(_, value)| **value > UNCHANGED)
+            .map(|(i, value)| eigen.eigenvectors[(number, i)].powi(2) / value)
+            .sum();
+        let std = variance.sqrt() / size[number];
+        Some(self.information.sqrt() / std)
     }
 
     /// Parameters and initial states of each recording.

@@ -146,7 +146,8 @@ fn clearly_better(
     ground: &Ground,
 ) -> Option<Fitted> {
     let best = glanced.min_by(|a, b| a.fit.deviance.total_cmp(&b.fit.deviance))?;
-    if best.fit.deviance > fitted.fit.deviance - TIE.0 {
+    // A glance may not get as far as a fit; what it leaves worse than no term at all is not followed.
+    if best.fit.deviance > fitted.fit.deviance + fitted.gain {
         return None;
     }
     let better = thoroughly(best, ground)?;

@@ -43,8 +43,8 @@ pub(in crate::explain::engine) fn determined(
     let options = with_more(options, found.candidate.values.len());
     let at = options.free.len() - 1;
     study.of(&found.candidate.plant, &options).is_ok_and(|own| {
-        let variance = own.covariance(&found.fit)[(at, at)];
-        found.fit.point[at].abs() > DETERMINED * variance.sqrt()
+        let away = own.deviations_from_zero(&found.fit, at);
+        away.is_some_and(|away| away > DETERMINED)
     })
 }
 
