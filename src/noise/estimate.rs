@@ -1,6 +1,6 @@
 //! Which colour a residual has.
 //!
-//! Autoregressions of all orders by Levinson and Durbin, and slow and white noise by Whittle's likelihood on a
+//! Autoregressions of all orders by Levinson and Durbin, and mixed models of low order by Whittle's likelihood on a
 //! periodogram of the prewhitened residual that is averaged over bins: a step of Fisher's scoring then costs some hundred operations and no pass
 //! over the data. Starts are those of Hannan and Rissanen (1982) and a grid of slow poles. The choice among all is by
 //! Schwarz's criterion with the exact likelihood of each.
@@ -15,10 +15,10 @@ use super::colour::{Colour, MOST_MIXED, MOST_ORDER};
 use super::{Mask, product};
 use crate::noise::Series;
 
-/// Autoregressive and moving average order of the mixed model that is tried, slow and white noise. Higher ones follow the misfit of a
-/// plant that lacks something as closely as its noise, so that searches end in other optima (Silverbox: twice the error).
-const MIXED: (usize, usize) = (1, 1);
-/// Slow poles and zeros from which it is started as well.
+/// Mixed models that are tried, `(autoregressive order, moving average order)`: slow and white noise is the first; the
+/// next are what a process of second order leaves beside white noise, alone or with a slow one.
+const MIXED: [(usize, usize); 4] = [(1, 1), (2, 1), (2, 2), (3, 3)];
+/// Slow poles and zeros from which the first is started as well.
 const SLOW: [(f64, f64); 6] = [
     (0.8, 0.4),
     (0.95, 0.6),
@@ -36,6 +36,9 @@ const SHORT_GAP: usize = 8;
 const SIDE_OF_A_LONG_GAP: usize = 20;
 /// Poles and zeros further out than this many samples' memory are not distinguished from the circle.
 const LONGEST_MEMORY: f64 = 1e5;
+/// An oscillation that stays in phase for more than one part in this of a recording is a disturbance with a frequency, and no
+/// noise.
+const COHERENCE: f64 = 20.0;
 /// Values that each coefficient needs.
 const VALUES_A_COEFFICIENT: usize = 12;
 
@@ -46,8 +49,10 @@ pub(crate) enum Colours {
     /// An autoregression of order one, in which hardly anything hides.
     #[cfg(test)]
     First,
-    /// Autoregressions of order two at most, and the mixed model: a long one learns slow misfit as colour.
+    /// Autoregressions of order two at most, and mixed ones up to (2, 2): a long one learns slow misfit as colour.
     Few,
+    /// Autoregressions of all orders, and slow and white noise.
+    Simple,
     All,
 }
 
@@ -58,12 +63,19 @@ impl Colours {
             #[cfg(test)]
             Self::First => 1,
             Self::Few => 2,
-            Self::All => MOST_ORDER,
+            Self::Simple | Self::All => MOST_ORDER,
         }
     }
 
-    fn mixed(self) -> bool {
-        matches!(self, Self::Few | Self::All)
+    fn mixed(self) -> &'static [(usize, usize)] {
+        match self {
+            Self::White => &[],
+            #[cfg(test)]
+            Self::First => &[],
+            Self::Few => &MIXED[..3],
+            Self::Simple => &MIXED[..1],
+            Self::All => &MIXED,
+        }
     }
 }
 
@@ -96,10 +108,10 @@ pub(super) fn colour(
     // About the mean: a constant is an offset to be explained, not colour with a pole at one.
     let mean = sum / n as f64;
     let filled: Vec<Vec<f64>> = stretches.iter().map(|(v, m)| bridged(v, m, mean)).collect();
-    let lags = if colours.mixed() {
-        most.max(LONG.min(n / VALUES_A_COEFFICIENT))
-    } else {
+    let lags = if colours.mixed().is_empty() {
         most
+    } else {
+        most.max(LONG.min(n / VALUES_A_COEFFICIENT))
     };
     let covariance = autocovariance(&filled, lags);
     if covariance[0].is_nan() || covariance[0] <= 0.0 {
@@ -110,8 +122,8 @@ pub(super) fn colour(
         let criterion = deviance(&colour, &stretches, mean) + colour.len() as f64 * (n as f64).ln();
         (criterion, colour)
     };
-    let best = judged(Colour::new(best, Vec::new()).unwrap_or_default());
-    if !colours.mixed() || n < VALUES_A_COEFFICIENT * LONG {
+    let mut best = judged(Colour::new(best, Vec::new()).unwrap_or_default());
+    if colours.mixed().is_empty() || n < VALUES_A_COEFFICIENT * LONG {
         return best.1;
     }
     let errors: Vec<Vec<f64>> = stretches
@@ -122,24 +134,45 @@ pub(super) fn colour(
         return best.1;
     };
     let starts = Starts::new(&filled, &errors, &covariance);
-    let mixed = mixed(&bins, &starts).map(judged);
-    match mixed {
-        Some(mixed) if mixed.0 < best.0 => mixed.1,
-        _ => best.1,
+    let coherent = (-COHERENCE / filled.iter().map(Vec::len).max().unwrap_or(1) as f64).exp();
+    let mut lower: Option<(Vec<f64>, Vec<f64>)> = None;
+    for &(p, q) in colours.mixed() {
+        let mut tried: Vec<(Vec<f64>, Vec<f64>)> = starts.mixed(p, q).into_iter().collect();
+        if (p, q) == (1, 1) {
+            tried.extend(SLOW.map(|(pole, zero)| (vec![-pole], vec![-zero])));
+        }
+        if let Some((ar, ma)) = &lower {
+            // A little pole and a little zero more.
+            let grown = |list: &[f64], by: f64, to: usize| {
+                let mut list = list.to_vec();
+                while list.len() < to {
+                    list = multiplied(&list, by);
+                }
+                list
+            };
+            tried.push((grown(ar, -0.5, p), grown(ma, -0.3, q)));
+        }
+        let first = tried
+            .into_iter()
+            .filter_map(|(ar, ma)| Some((bins.deviance(&ar, &ma)?, ar, ma)))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, ar, ma)) = first else { continue };
+        let Some((ar, ma)) = bins.fitted(ar, ma) else {
+            continue;
+        };
+        let Some(colour) = inside(&ar, coherent)
+            .zip(inside(&ma, 1.0))
+            .and_then(|(ar, ma)| Colour::new(ar, ma))
+        else {
+            continue;
+        };
+        lower = Some((colour.ar.clone(), colour.ma.clone()));
+        let mixed = judged(colour);
+        if mixed.0 < best.0 {
+            best = mixed;
+        }
     }
-}
-
-/// The mixed model of largest Whittle likelihood.
-fn mixed(bins: &Bins, starts: &Starts) -> Option<Colour> {
-    let own = starts.mixed(MIXED.0, MIXED.1);
-    let slow = SLOW.map(|(pole, zero)| (vec![-pole], vec![-zero]));
-    let (_, ar, ma) = own
-        .into_iter()
-        .chain(slow)
-        .filter_map(|(ar, ma)| Some((bins.deviance(&ar, &ma)?, ar, ma)))
-        .min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let (ar, ma) = bins.fitted(ar, ma)?;
-    Colour::new(inside(&ar)?, inside(&ma)?)
+    best.1
 }
 
 /// A stretch less the mean; what does not count is bridged, unless most values stand alone.
@@ -266,8 +299,23 @@ fn deviance(colour: &Colour, stretches: &[(&[f64], &[bool])], mean: f64) -> f64 
     count as f64 * (squares / count as f64).max(1e-300).ln() + determinant
 }
 
-/// The polynomial of the same magnitude on the circle whose roots are inside of it.
-fn inside(polynomial: &[f64]) -> Option<Vec<f64>> {
+/// Coefficients of `(1 + p1 z + ...) (1 + root z)`.
+fn multiplied(polynomial: &[f64], root: f64) -> Vec<f64> {
+    let at = |i: usize| {
+        if i == 0 {
+            1.0
+        } else {
+            polynomial.get(i - 1).copied().unwrap_or(0.0)
+        }
+    };
+    (1..=polynomial.len() + 1)
+        .map(|i| at(i) + root * at(i - 1))
+        .collect()
+}
+
+/// The polynomial of the same magnitude on the circle whose roots are inside of it, complex ones no nearer to it than
+/// `coherent`.
+fn inside(polynomial: &[f64], coherent: f64) -> Option<Vec<f64>> {
     let n = polynomial.len();
     let companion = DMatrix::from_fn(n, n, |i, j| {
         if i == 0 {
@@ -284,6 +332,11 @@ fn inside(polynomial: &[f64]) -> Option<Vec<f64>> {
         if root.norm() > 1.0 {
             root = root.conj().inv();
         }
+        let most = if root.im == 0.0 {
+            most
+        } else {
+            most.min(coherent)
+        };
         if root.norm() > most {
             root *= most / root.norm();
         }
@@ -358,7 +411,7 @@ impl Starts {
         let solved = gram.cholesky()?.solve(&right);
         let ar: Vec<f64> = solved.iter().take(p).map(|v| -v).collect();
         let ma: Vec<f64> = solved.iter().skip(p).copied().collect();
-        inside(&ar).zip(inside(&ma))
+        inside(&ar, 1.0).zip(inside(&ma, 1.0))
     }
 }
 

@@ -291,7 +291,9 @@ pub(super) fn step(stage: &Stage) -> Step {
                 0 => inner.glance(start, GLANCE),
                 _ => inner.refit(start, 0, GLANCE),
             };
-            let text = of_text(from).filter(|_| more > 1).or_else(|| off_bounds(from));
+            let text = of_text(from)
+                .filter(|_| more > 1)
+                .or_else(|| off_bounds(from));
             let otherwise = text.and_then(|text| glance(&made.from(&text, parameters)));
             let fitted = (glance(&start).into_iter().chain(otherwise))
                 .min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
@@ -426,11 +428,6 @@ pub(super) fn step(stage: &Stage) -> Step {
         }
     }
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    if std::env::var("STEPDBG").is_ok() {
-        eprintln!("STEP accepted {accepted} needed {needed:.1} strongest {:?} info {:.4} fit {:.2?}", strongest, study.information(), &fit.point);
-        for (s, _) in &tried { eprintln!("  leads {} curves {} best {:?}", s.leads.len(), s.curves.len(), s.leads.iter().take(5).map(|l| (l.term.id, l.statistic as i64)).collect::<Vec<_>>()); }
-        for f in fitted.iter().take(8) { eprintln!("  {:.1} {} {:.3?}", f.gain, f.candidate.equation.chars().take(120).collect::<String>(), f.fit.point); }
-    }
     order(&plant.spec, &mut fitted);
     Step {
         fitted,

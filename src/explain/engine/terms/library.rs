@@ -212,13 +212,7 @@ pub(crate) const TERMS: &[Term] = &[
         &[shape("from", Starts::SizeQuantiles(ABOVE), true)],
     ),
     // Play in a spring that the equations have: it takes its force away, up to the gap `g`.
-    curve(
-        "gap",
-        Equation,
-        Stretch,
-        "min(max({z}, -{g}), {g})",
-        &[GAP],
-    ),
+    curve("gap", Equation, Stretch, "min(max({z}, -{g}), {g})", &[GAP]),
     curve(
         "root_above",
         Equation,

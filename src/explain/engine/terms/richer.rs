@@ -1,9 +1,9 @@
 //! Forms of terms with one shape more, where their physics has one.
 
 use super::library::{
-    ABOVE, BACKLASH, BELOW, DEAD_ZONE, GAP, HYSTERESIS, LIMIT, STICTION, STOP, UPPER_LIMIT, hysteresis,
+    ABOVE, BACKLASH, BELOW, DEAD_ZONE, HYSTERESIS, LIMIT, STICTION, STOP, UPPER_LIMIT, hysteresis,
 };
-use super::term::Needs::{self, Anything, BothSigns, Stretch, Time};
+use super::term::Needs::{self, Anything, BothSigns, Time};
 use super::term::Port::{Equation, Input, Parameter, Sensor};
 use super::term::{Memory, MemoryStart, Shape, Starts, Term, curve, in_place, sampled, shape};
 
@@ -15,7 +15,6 @@ pub(in crate::explain::engine) fn richer(term: &Term) -> &'static [Term] {
         ("above", _) => ABOVE_MORE,
         ("below", _) => BELOW_MORE,
         ("both_sides", _) => BOTH_SIDES_MORE,
-        ("gap", _) => GAP_DAMPED,
         ("load_ramp", _) => LOAD_LATER,
         ("parameter_ramp", _) => PARAMETER_LATER,
         ("sensor_drift", _) => DRIFT_LATER,
@@ -84,14 +83,6 @@ const BOTH_SIDES_MORE: &[Term] = &[
         &[shape("from", Starts::SizeQuantiles(ABOVE), true), OTHER],
     ),
 ];
-/// Inside of the gap nothing touches: the damper of the spring acts no more than the spring. `D` is the ratio of the two.
-const GAP_DAMPED: &[Term] = &[curve(
-    "gap",
-    Equation,
-    Stretch,
-    "min(max({z}, -{g}), {g}) + {D}*(if abs({z}) < {g} then {dz} else 0)",
-    &[GAP, shape("D", Starts::Samples(&[0.3, 3.0, 30.0]), true)],
-)];
 const LOAD_LATER: &[Term] = &[curve("load_ramp", Equation, Time, LATER, &[BEGIN])];
 const PARAMETER_LATER: &[Term] = &[curve("parameter_ramp", Parameter, Time, LATER, &[BEGIN])];
 const DRIFT_LATER: &[Term] = &[curve("sensor_drift", Sensor, Time, LATER, &[BEGIN])];
@@ -201,6 +192,6 @@ mod tests {
             assert_eq!(of(richer), of(simple));
             count += 1;
         }
-        assert_eq!(count, 16);
+        assert_eq!(count, 15);
     }
 }

@@ -21,7 +21,7 @@ use crate::explain::linear::search::richer_laws::{
     FURTHER, REFINEMENTS, decides_within, derived, finer_steps,
 };
 use crate::explain::linear::search::single_effects::{Ranked, fit_lead, single_effects};
-use crate::noise::Mask;
+use crate::noise::{Colours, Mask};
 
 /// Names whose criteria differ by less explain the recording equally well (Kass and Raftery 1995: 6 is "strong").
 const TIE: f64 = crate::explain::explanation::EFFECTS_TIE;
@@ -283,7 +283,11 @@ pub(crate) fn inquire(
         let mut fit = if other_class {
             best.fit.clone()
         } else {
-            polished(&problem, &best.fit)
+            let first = polished(&problem, &best.fit);
+            match base - first.criterion(count) > BEYOND_DOUBT {
+                true => found_again(&problem, structure, refit.as_ref(), first, allowed),
+                false => first,
+            }
         };
         if let Some(direct) = with_feedthrough(&problem, &fit) {
             fit = direct;
@@ -375,6 +379,40 @@ pub(crate) fn inquire(
 /// Probability of a larger difference between two recordings of one plant, below which its parameters are said to have
 /// changed.
 const SAME_PLANT: f64 = 1e-3;
+
+/// The fit of an effect, or that of another search for it alone, which is better. Noise models with several poles and zeros follow
+/// what a plant lacks as closely as its noise, and may lead a search to another optimum than simple ones.
+fn found_again(
+    problem: &Problem,
+    structure: &Structure,
+    refit: Option<&Structure>,
+    first: Fit,
+    allowed: &(dyn Fn(&Definition) -> bool + Sync),
+) -> Fit {
+    let count = problem.count();
+    let simple = Problem {
+        colours: Colours::Simple,
+        ..problem.clone()
+    };
+    let again = || {
+        let id = first.structure.new_effects().last()?.definition.id;
+        let only = |d: &Definition| d.id == id && allowed(d);
+        let boring = Boring::fit(&simple, structure, refit)?;
+        let base = boring.best(count).criterion(count);
+        let mut ranked = single_effects(&simple, &boring, &only);
+        for refinements in [REFINEMENTS, FURTHER] {
+            ranked.extend(derived(&simple, refinements, &ranked, base, &only));
+        }
+        let best = ranked.iter().filter(|r| sane(problem, &r.fit));
+        let best = best.min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
+        Some(polished(
+            problem,
+            &best.fit.improved(problem, Effort::RANK)?,
+        ))
+    };
+    let better = again().filter(|fit| fit.criterion(count) < first.criterion(count) - TIE);
+    better.unwrap_or(first)
+}
 
 /// Whether an identified simulation differs from the best fit by no more than both are uncertain by.
 fn is_as_identified(known: &Known, problem: &Problem, boring: &Boring) -> bool {

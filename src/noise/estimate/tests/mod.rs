@@ -47,15 +47,14 @@ fn slow_and_white_noise_is_of_order_one() {
 }
 
 #[test]
-fn models_reach_the_likelihood_of_the_truth() {
-    // Slow and white noise by its own model; others by a long autoregression, as an innovation variance one in a hundred greater.
-    let models: [(&[f64], &[f64], f64); 4] = [
-        (&[-0.999], &[-0.9], 10.0),
-        (&[-1.6, 0.64], &[-0.3], 30.0),
-        (&[-1.7, 0.8], &[-0.4, 0.2], 30.0),
-        (&[-1.95, 0.955], &[-1.2, 0.3], 30.0),
+fn mixed_models_reach_the_likelihood_of_the_truth() {
+    let models: [(&[f64], &[f64]); 4] = [
+        (&[-1.6, 0.64], &[-0.3]),
+        (&[-1.7, 0.8], &[-0.4, 0.2]),
+        (&[-0.999], &[-0.9]),
+        (&[-1.95, 0.955], &[-1.2, 0.3]),
     ];
-    for (ar, ma, most) in models {
+    for (ar, ma) in models {
         for seed in 0..5 {
             let v = drawn(ar, ma, 3000, 50 + seed);
             let mask = vec![true; v.len()];
@@ -66,7 +65,7 @@ fn models_reach_the_likelihood_of_the_truth() {
             let mean = v.iter().sum::<f64>() / v.len() as f64;
             let worse = deviance(&found, &stretch, mean) - deviance(&truth, &stretch, mean);
             // A model with fewer coefficients may be chosen: by Schwarz each is worth ln(3000) = 8.
-            assert!(worse < most, "{ar:?} {ma:?} {seed}: {worse} {found:?}");
+            assert!(worse < 10.0, "{ar:?} {ma:?} {seed}: {worse} {found:?}");
         }
     }
 }
