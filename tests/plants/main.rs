@@ -23,6 +23,7 @@ mod plant_held_out;
 mod plant_hypotheses;
 mod plant_initial_states;
 mod plant_long;
+mod plant_neighbours;
 
 mod plant_parameters;
 mod plant_parts;

@@ -63,7 +63,12 @@ pub(crate) enum Objective {
 impl Found {
     /// The strongest test at the end, and how many there were.
     pub(crate) fn left(&self) -> (f64, usize) {
-        self.tests.get(self.accepted).copied().unwrap_or_default()
+        // Where no test could be made, none finds anything.
+        self.tests
+            .get(self.accepted)
+            .copied()
+            .filter(|t| t.1 > 0)
+            .unwrap_or((0.0, 1))
     }
 
     /// The plant with so many effects, and its fit.

@@ -27,6 +27,12 @@ use crate::physics::{ModelSpec, Plant};
 /// Part of the best gain that a term has whose richer forms are tried.
 const RICHER: f64 = 0.5;
 
+/// Terms with a name that are fitted at the place of a best that has none.
+const NAMED_THERE: usize = 6;
+
+/// What a lead gains at a glance, where it was found, and its fit.
+type Glanced = (f64, Lead, usize, Candidate, Fit);
+
 fn promising(screen: &Screen, spec: &ModelSpec, more: usize) -> Vec<Lead> {
     let mut kept: Vec<Lead> = Vec::new();
     for lead in &screen.leads {
@@ -267,7 +273,31 @@ pub(super) fn step(stage: &Stage) -> Step {
         })
     };
     let more = times_more(study.count().max(study.samples()));
-    let mut glanced: Vec<(f64, Lead, usize, Candidate, Fit)> = tried
+    let glance_lead = |(i, screen, from, lead): (usize, &Screen, &Fit, Lead)| {
+        let made = candidate(&plant.spec, &lead, &screen.arguments, recordings)?;
+        let options = with_more(options, made.values.len());
+        let rough = made.rough(study, GLANCED_STEPS);
+        let inner = study.of(&rough, &options).ok()?;
+        let start = match screen.strays {
+            true => started(&inner, &made, &lead, (study, from)),
+            false => made.from(from, parameters),
+        };
+        // What a memory does within a sample, such as a contact, frozen slopes do not see.
+        let glance = |start: &Fit| match made.new_states {
+            0 => inner.glance(start, GLANCE),
+            _ => inner.refit(start, 0, GLANCE),
+        };
+        let text = of_text(from)
+            .filter(|_| more > 1)
+            .or_else(|| off_bounds(from));
+        let otherwise = text.and_then(|text| glance(&made.from(&text, parameters)));
+        let fitted = (glance(&start).into_iter().chain(otherwise))
+            .min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
+        let again = |fit: &Fit| inner.refit(fit, 0, GLANCE);
+        let fitted = released(&inner, lead.term, parameters, fitted, &again);
+        Some((from.deviance - fitted.deviance, lead, i, made, fitted))
+    };
+    let mut glanced: Vec<Glanced> = tried
         .iter()
         .enumerate()
         .flat_map(|(i, (screen, from))| {
@@ -277,30 +307,7 @@ pub(super) fn step(stage: &Stage) -> Step {
         })
         .collect::<Vec<_>>()
         .into_par_iter()
-        .filter_map(|(i, screen, from, lead)| {
-            let made = candidate(&plant.spec, &lead, &screen.arguments, recordings)?;
-            let options = with_more(options, made.values.len());
-            let rough = made.rough(study, GLANCED_STEPS);
-            let inner = study.of(&rough, &options).ok()?;
-            let start = match screen.strays {
-                true => started(&inner, &made, &lead, (study, from)),
-                false => made.from(from, parameters),
-            };
-            // What a memory does within a sample, such as a contact, frozen slopes do not see.
-            let glance = |start: &Fit| match made.new_states {
-                0 => inner.glance(start, GLANCE),
-                _ => inner.refit(start, 0, GLANCE),
-            };
-            let text = of_text(from)
-                .filter(|_| more > 1)
-                .or_else(|| off_bounds(from));
-            let otherwise = text.and_then(|text| glance(&made.from(&text, parameters)));
-            let fitted = (glance(&start).into_iter().chain(otherwise))
-                .min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
-            let again = |fit: &Fit| inner.refit(fit, 0, GLANCE);
-            let fitted = released(&inner, lead.term, parameters, fitted, &again);
-            Some((from.deviance - fitted.deviance, lead, i, made, fitted))
-        })
+        .filter_map(glance_lead)
         .collect();
     glanced.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut chosen: Vec<(Lead, usize, Candidate, Fit)> = Vec::new();
@@ -308,7 +315,7 @@ pub(super) fn step(stage: &Stage) -> Step {
         let list: Vec<_> = glanced.iter().filter(|g| g.2 == which).collect();
         let most = list.first().map_or(0.0, |g| g.0);
         let close = |g: &&_| {
-            let (gain, lead, ..): &(f64, Lead, usize, Candidate, Fit) = g;
+            let (gain, lead, ..): &Glanced = g;
             let variables = lead
                 .argument
                 .map_or(&[][..], |a| &screen.arguments[a].variables);
@@ -323,46 +330,70 @@ pub(super) fn step(stage: &Stage) -> Step {
                 .map(|g| (g.1.clone(), g.2, g.3.clone(), g.4.clone())),
         );
     }
-    let fitted: Vec<Fitted> = chosen
-        .into_par_iter()
-        .filter_map(|(lead, which, made, from)| {
-            let arguments = &tried[which].0.arguments;
-            let options = with_more(options, made.values.len());
-            let rough = made.rough(study, MOST_STEPS);
-            let inner = study.of(&rough, &options).ok()?;
-            let starts = forms(from, fit, study.gains());
-            let best = starts
+    let fit_lead = |(lead, which, made, from): (Lead, usize, Candidate, Fit)| {
+        let arguments = &tried[which].0.arguments;
+        let options = with_more(options, made.values.len());
+        let rough = made.rough(study, MOST_STEPS);
+        let inner = study.of(&rough, &options).ok()?;
+        let starts = forms(from, fit, study.gains());
+        let best = starts
+            .iter()
+            .filter_map(|start| match made.new_states {
+                0 => inner.compare(start, COMPARED),
+                _ => inner.refit(start, 1, THOROUGH),
+            })
+            .filter(|fit| {
+                fit.form == Form::Innovation
+                    || inner.follows(fit) && still_shows((&inner, fit), &lead, &plant.spec)
+            })
+            .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
+        let gain = fit.criterion - best.criterion - searched(&lead, recordings);
+        let argument = lead.argument.map(|a| &arguments[a]);
+        let fitted = Fitted {
+            depends: vec![],
+            argument: String::new(),
+            range: (0.0, 0.0),
+            travel: 0.0,
+            usual: 0.0,
+            shapes: best.point[parameters..][..lead.shapes.len()].to_vec(),
+            lead,
+            candidate: made,
+            fit: best,
+            gain,
+            hypothesis: None,
+            explains: false,
+            proved: false,
+            likelier: false,
+        };
+        Some(fitted.depending_on(argument, &plant.spec, recordings))
+    };
+    let mut fitted: Vec<Fitted> = chosen.into_par_iter().filter_map(fit_lead).collect();
+    // Where the best has no name, terms that have one at its place are fitted as well, whatever a glance said of them.
+    let best = fitted.iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
+    if let Some(best) = best.filter(|f| f.gain > needed && named(&plant.spec, f) == "law") {
+        let known = |l: &Lead| {
+            fitted
                 .iter()
-                .filter_map(|start| match made.new_states {
-                    0 => inner.compare(start, COMPARED),
-                    _ => inner.refit(start, 1, THOROUGH),
-                })
-                .filter(|fit| {
-                    fit.form == Form::Innovation
-                        || inner.follows(fit) && still_shows((&inner, fit), &lead, &plant.spec)
-                })
-                .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
-            let gain = fit.criterion - best.criterion - searched(&lead, recordings);
-            let argument = lead.argument.map(|a| &arguments[a]);
-            let fitted = Fitted {
-                depends: vec![],
-                argument: String::new(),
-                range: (0.0, 0.0),
-                travel: 0.0,
-                usual: 0.0,
-                shapes: best.point[parameters..][..lead.shapes.len()].to_vec(),
-                lead,
-                candidate: made,
-                fit: best,
-                gain,
-                hypothesis: None,
-                explains: false,
-                proved: false,
-                likelier: false,
-            };
-            Some(fitted.depending_on(argument, &plant.spec, recordings))
-        })
-        .collect();
+                .any(|f| (f.lead.term, f.lead.place) == (l.term, l.place))
+        };
+        let mut more: Vec<(usize, &Screen, &Fit, Lead)> = Vec::new();
+        for (i, (screen, from)) in tried.iter().enumerate() {
+            let at_place = screen.leads.iter().filter(|l| l.place == best.lead.place);
+            for lead in at_place.filter(|l| !known(l)) {
+                let variables = lead
+                    .argument
+                    .map_or(&[][..], |a| &screen.arguments[a].variables);
+                let specific = rank_of(&plant.spec, lead.term, lead.place, variables) < SPECIFIC;
+                let again = more.iter().any(|m| m.3.term == lead.term);
+                if specific && !again && more.len() < NAMED_THERE {
+                    more.push((i, screen, from, lead.clone()));
+                }
+            }
+        }
+        let glanced = more.into_par_iter().filter_map(glance_lead);
+        let chosen = glanced.map(|(_, lead, i, made, fit)| (lead, i, made, fit));
+        fitted.extend(chosen.filter_map(fit_lead).collect::<Vec<_>>());
+    }
     let fitted = drop_repeated(fitted);
     let mut fitted = finished(fitted, study, fit, recordings, options);
     fitted.retain(|f| f.gain <= NEEDED || f.gain_without_few(study, fit, options) > NEEDED);

@@ -397,9 +397,14 @@ fn found_again(
     let again = || {
         let id = first.structure.new_effects().last()?.definition.id;
         let only = |d: &Definition| d.id == id && allowed(d);
-        let boring = Boring::fit(&simple, structure, refit)?;
-        let base = boring.best(count).criterion(count);
+        let mut boring = Boring::fit(&simple, structure, refit)?;
+        if let Some(direct) = with_feedthrough(&simple, &boring.full) {
+            boring.full = direct;
+        }
         let mut ranked = single_effects(&simple, &boring, &only);
+        let promising: Vec<&Fit> = ranked.iter().map(|r| &r.fit).collect();
+        boring.improve_from(&simple, &promising);
+        let base = boring.best(count).criterion(count);
         for refinements in [REFINEMENTS, FURTHER] {
             ranked.extend(derived(&simple, refinements, &ranked, base, &only));
         }

@@ -93,14 +93,17 @@ pub(crate) fn plant_may_stay(
 }
 
 /// Whether an effect beside the plant as given explains as much as other parameters do: it wins by fewer numbers, and
-/// where those explain significantly more it stands for them (math/explain.md, choice 5).
-/// Errors of a simulation that was identified from about as long a recording count as often as those of the fit.
+/// where those explain significantly more it stands for them (math/explain.md, choice 5). The parameters of a simulation that was
+/// identified have errors of their own: an effect must explain more than other parameters do.
 pub(crate) fn reaches(fit: &Fit, full: &Fit, identified: bool) -> bool {
     if fit.structure.plant_free {
         return true;
     }
+    let short = fit.deviance - full.deviance;
+    if identified {
+        return short < -NEEDED;
+    }
     let more = full.free.saturating_sub(fit.free).max(1);
-    let short = (fit.deviance - full.deviance) / if identified { 2.0 } else { 1.0 };
     ChiSquared::new(more as f64).map_or(true, |d| d.sf(short.max(0.0)) > SHORT_OF_FULL)
 }
 
