@@ -371,11 +371,9 @@ pub(super) fn step(stage: &Stage) -> Step {
     // Where the best has no name, terms that have one at its place are fitted as well, whatever a glance said of them.
     let best = fitted.iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
     if let Some(best) = best.filter(|f| f.gain > needed && named(&plant.spec, f) == "law") {
-        let known = |l: &Lead| {
-            fitted
-                .iter()
-                .any(|f| (f.lead.term, f.lead.place) == (l.term, l.place))
-        };
+        let same =
+            |a: &Lead, b: &Lead| (a.term, a.place, a.argument) == (b.term, b.place, b.argument);
+        let known = |l: &Lead| fitted.iter().any(|f| same(&f.lead, l));
         let mut more: Vec<(usize, &Screen, &Fit, Lead)> = Vec::new();
         for (i, (screen, from)) in tried.iter().enumerate() {
             let at_place = screen.leads.iter().filter(|l| l.place == best.lead.place);
@@ -384,8 +382,9 @@ pub(super) fn step(stage: &Stage) -> Step {
                     .argument
                     .map_or(&[][..], |a| &screen.arguments[a].variables);
                 let specific = rank_of(&plant.spec, lead.term, lead.place, variables) < SPECIFIC;
-                let again = more.iter().any(|m| m.3.term == lead.term);
-                if specific && !again && more.len() < NAMED_THERE {
+                let again = more.iter().any(|m| same(&m.3, lead));
+                let of_term = more.iter().filter(|m| m.3.term == lead.term).count();
+                if specific && !again && of_term < 2 && more.len() < NAMED_THERE {
                     more.push((i, screen, from, lead.clone()));
                 }
             }

@@ -43,6 +43,22 @@ pub(super) const fn hysteresis(memories: &'static [Memory], shapes: &'static [Sh
     }
 }
 
+/// Wave number and phase in an angle.
+const WAVE: &[Shape] = &[
+    shape(
+        "k",
+        Starts::Waves(&[
+            1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0,
+        ]),
+        true,
+    ),
+    shape(
+        "p",
+        Starts::Values(&[0.0, std::f64::consts::FRAC_PI_2]),
+        false,
+    ),
+];
+
 /// The library.
 pub(crate) const TERMS: &[Term] = &[
     curve("linear", Equation, Anything, "{z}", &[]),
@@ -224,26 +240,7 @@ pub(crate) const TERMS: &[Term] = &[
             false,
         )],
     ),
-    curve(
-        "sine",
-        Equation,
-        Angle,
-        "sin({k}*{z} + {p})",
-        &[
-            shape(
-                "k",
-                Starts::Waves(&[
-                    1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0,
-                ]),
-                true,
-            ),
-            shape(
-                "p",
-                Starts::Values(&[0.0, std::f64::consts::FRAC_PI_2]),
-                false,
-            ),
-        ],
-    ),
+    curve("sine", Equation, Angle, "sin({k}*{z} + {p})", WAVE),
     curve("gravity", Equation, Angle, "sin({z})", &[]),
     curve(
         "gravity",
@@ -301,6 +298,14 @@ pub(crate) const TERMS: &[Term] = &[
         Anything,
         "({z}^2 - {usual}^2)",
         &[],
+    ),
+    // Gains that go round with an angle: eccentric magnets, gears, cranks.
+    curve(
+        "parameter_sine",
+        Parameter,
+        Angle,
+        "sin({k}*{z} + {p})",
+        WAVE,
     ),
     curve(
         "parameter_step",

@@ -255,6 +255,7 @@ pub(crate) fn called(
         {
             "temperature_dependent_resistance"
         }
+        (Port::Parameter, "parameter_sine") => "position_dependent_gain",
         (Port::Parameter, "parameter_curve" | "parameter_square") => match what {
             Kind::Temperature if unit_of_place == "Ohm" => "temperature_dependent_resistance",
             Kind::Position => "position_dependent_gain",
