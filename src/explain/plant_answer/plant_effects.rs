@@ -149,13 +149,33 @@ impl Answer<'_> {
     }
 
     /// The parameters of an effect with their standard deviations, or its curve with them; none where there are many. `label` says
-    /// whose they are.
+    /// whose they are. Of a parameter that changes also what it is besides.
     pub(super) fn estimates(
         &self,
         fitted: &Fitted,
         effect: &EffectFound,
         label: &str,
     ) -> Vec<String> {
+        let mut lines = self.own_estimates(fitted, effect, label);
+        // What a parameter is besides, which may differ from the text without being surely different.
+        if let Place::Parameter(v) = fitted.lead.place {
+            let name = &self.plant.spec.variable(v).name;
+            let spec = &self.found.plant.spec;
+            let called = |&v: &VariableId| spec.variable(v).name == *name;
+            let at = spec.parameters().iter().position(called);
+            let value = at.and_then(|at| self.found.fit.point.get(at));
+            lines.extend(value.map(|&value| {
+                let (std, unit) = (None, self.unit(name));
+                format!(
+                    "There, {name} = {}.",
+                    quantity(&Quantity { value, std, unit })
+                )
+            }));
+        }
+        lines
+    }
+
+    fn own_estimates(&self, fitted: &Fitted, effect: &EffectFound, label: &str) -> Vec<String> {
         let mut all: Vec<(&String, &Quantity)> = Vec::new();
         for name in &fitted.candidate.names {
             all.extend(effect.parameters.get(name).map(|q| (name, q)));
