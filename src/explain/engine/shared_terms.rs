@@ -3,17 +3,25 @@
 
 use super::fitting::candidate::free_name;
 use super::fitting::edit::{Edit, Place, SHARED_TERM, substituted};
+use super::terms::summands::{flatten, sums_in};
 use crate::physics::{
     Binary, ExpressionId, Function, ModelSpec, Node, Span, Unknown, VariableId, VariableKind,
 };
 
 /// Most variables that a plant gets.
 const MOST: usize = 8;
+/// Larger texts stay as they are: terms are compared each with each.
+const MOST_NODES: usize = 2000;
 
 /// The plant with a variable for terms that several rates share; none where there are no such terms.
 pub(crate) fn with_shared_terms(spec: &ModelSpec) -> Option<ModelSpec> {
     let mut found: Option<ModelSpec> = None;
-    for _ in 0..MOST {
+    let most = if spec.expressions.len() > MOST_NODES {
+        0
+    } else {
+        MOST
+    };
+    for _ in 0..most {
         match shared(found.as_ref().unwrap_or(spec)) {
             Some(next) => found = Some(next),
             None => break,
@@ -135,48 +143,22 @@ fn sums(spec: &ModelSpec) -> Vec<Sum> {
         if !matches!(e.unknown, Unknown::Derivative(_)) {
             continue;
         }
-        let mut waiting = vec![e.right];
-        while let Some(id) = waiting.pop() {
-            let node = spec.expressions.node(id);
-            match node {
-                Node::Binary(Binary::Divide, a, _) => waiting.push(a),
-                Node::Binary(Binary::Multiply, a, b) if is_sum(spec, a) != is_sum(spec, b) => {
-                    waiting.push(if is_sum(spec, a) { a } else { b });
-                }
-                _ => {
-                    let mut parts = Vec::new();
-                    flatten(spec, id, 1.0, &mut parts);
-                    let parts = parts.into_iter().map(|(sign, id)| part(spec, sign, id));
-                    found.push(Sum {
-                        equation,
-                        span: spec.expressions.span(id),
-                        parts: parts.collect(),
-                    });
-                }
+        for (id, parts) in sums_in(spec, e.right) {
+            let parts = parts.into_iter().map(|(sign, id)| part(spec, sign, id));
+            let parts: Vec<Part> = parts.collect();
+            let twice = |p: &Part| parts.iter().filter(|o| o.key == p.key).count() > 1;
+            // A term that stands twice in one sum is left alone.
+            if !parts.iter().any(twice) {
+                let span = spec.expressions.span(id);
+                found.push(Sum {
+                    equation,
+                    span,
+                    parts,
+                });
             }
         }
     }
     found
-}
-
-fn is_sum(spec: &ModelSpec, id: ExpressionId) -> bool {
-    let node = spec.expressions.node(id);
-    matches!(node, Node::Binary(Binary::Add | Binary::Subtract, _, _))
-}
-
-fn flatten(spec: &ModelSpec, id: ExpressionId, sign: f64, parts: &mut Vec<(f64, ExpressionId)>) {
-    match spec.expressions.node(id) {
-        Node::Negate(a) => flatten(spec, a, -sign, parts),
-        Node::Binary(Binary::Add, a, b) => {
-            flatten(spec, a, sign, parts);
-            flatten(spec, b, sign, parts);
-        }
-        Node::Binary(Binary::Subtract, a, b) => {
-            flatten(spec, a, sign, parts);
-            flatten(spec, b, -sign, parts);
-        }
-        _ => parts.push((sign, id)),
-    }
 }
 
 fn part(spec: &ModelSpec, sign: f64, id: ExpressionId) -> Part {

@@ -8,6 +8,7 @@ use crate::explain::engine::screening::projection::Projection;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::{Argument, ArgumentForm};
 use crate::explain::engine::terms::library::CURVE;
+use crate::explain::engine::terms::summands::multiplies_only;
 use crate::explain::engine::terms::term::Port;
 use crate::noise::Series;
 use crate::physics::{ModelSpec, Unknown, VariableKind};
@@ -138,6 +139,13 @@ pub(in crate::explain::engine) fn curves(
             };
             let form = arguments[argument].form;
             let of_one = matches!(form, ArgumentForm::Variable | ArgumentForm::Difference);
+            let of_one = of_one
+                && match lead.place {
+                    Place::Parameter(p) => {
+                        !multiplies_only(spec, p, &arguments[argument].variables)
+                    }
+                    _ => true,
+                };
             if of_one && !pairs.contains(&(lead.place, argument)) {
                 pairs.push((lead.place, argument));
             }

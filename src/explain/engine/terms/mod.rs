@@ -5,5 +5,6 @@ pub(crate) mod documentation;
 pub(crate) mod library;
 pub(crate) mod names;
 pub(crate) mod richer;
+pub(crate) mod summands;
 pub(crate) mod term;
 pub(crate) mod values;
