@@ -34,7 +34,7 @@ fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
     let moves = spec
         .states()
         .iter()
-        .any(|&v| defines(spec, v) || matches!(unit(v), "m/s" | "rad/s"));
+        .any(|&v| defines(spec, v) || is_of_speed(unit(v)));
     // Of a position only the velocity need be known: `der(x) = v` with a state `v`.
     let states = spec.states();
     let moves_by = |x: VariableId| {
@@ -44,7 +44,7 @@ fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
                 && matches!(spec.expressions.node(e.rest), Node::Variable(v) if states.contains(&v))
         })
     };
-    if all(&|v| defines(spec, v) || matches!(unit(v), "m/s" | "rad/s" | "rpm" | "rev/min")) {
+    if all(&|v| defines(spec, v) || is_of_speed(unit(v))) {
         Kind::Velocity
     } else if all(&moves_by) || moves && all(&|v| matches!(unit(v), "m" | "rad" | "deg" | "mm")) {
         Kind::Position
@@ -55,6 +55,14 @@ fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
     } else {
         Kind::Other
     }
+}
+
+/// Whether a unit is one of a speed.
+fn is_of_speed(unit: &str) -> bool {
+    matches!(
+        unit,
+        "m/s" | "cm/s" | "mm/s" | "km/h" | "kn" | "rad/s" | "deg/s" | "rpm" | "rev/min"
+    )
 }
 
 /// Whether no variable of a plant has a unit.
@@ -129,7 +137,13 @@ fn term_in_range(found: &Fitted) -> &'static Term {
 pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
     let variables: Vec<VariableId> = found.depends.iter().filter_map(|n| spec.find(n)).collect();
     let term = term_in_range(found);
-    let id = called(spec, term, found.lead.place, &variables);
+    let id = match called(spec, term, found.lead.place, &variables) {
+        // Of a speed that is never below zero the square is its own with the sign.
+        "law" if term.id == "square" && found.range.0 >= 0.0 && is_velocity(spec, &variables) => {
+            "quadratic_drag"
+        }
+        id => id,
+    };
     // Values of the fit decide between names of one term.
     let fastest = found.range.0.abs().max(found.range.1.abs());
     match (id, found.shapes.first()) {
