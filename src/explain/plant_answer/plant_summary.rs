@@ -56,8 +56,10 @@ impl Answer<'_> {
         let bounds = at_bounds(&self.plant.spec, &self.found.fit.point, &self.covariance);
         match told.verdict {
             Verdict::Consistent | Verdict::Parameters => {
-                lines.extend(nothing_missing(told, !bounds.determined.is_empty()));
-                lines.extend(self.found.likelier.as_ref().map(|f| self.hidden(f)));
+                let hidden = self.found.likelier.as_ref();
+                let bound = !bounds.determined.is_empty();
+                lines.extend(nothing_missing(told, bound, hidden.is_some()));
+                lines.extend(hidden.map(|f| self.hidden(f)));
             }
             Verdict::Named | Verdict::Family => {
                 for (effect, fitted) in told.effects.iter().zip(self.effects()) {
@@ -193,7 +195,7 @@ impl Answer<'_> {
 }
 
 /// What is said where no effect is found.
-fn nothing_missing(told: &Told, at_bound: bool) -> Vec<String> {
+fn nothing_missing(told: &Told, at_bound: bool, hidden: bool) -> Vec<String> {
     let with = match told.differs {
         Differs::No => "the values of the text",
         Differs::Starts => "the parameters of the text and other initial states",
@@ -221,6 +223,8 @@ fn nothing_missing(told: &Told, at_bound: bool) -> Vec<String> {
         format!("The equations follow the recording with {with} within their bounds; {no_effect}.")
     } else if strays {
         format!("The equations explain the recording with {with} and slow noise; {no_effect}.")
+    } else if hidden {
+        format!("The equations follow the recording with {with}; {no_effect}.")
     } else if told.verdict == Verdict::Consistent {
         format!("The equations explain the recording with {with}; residuals are white.")
     } else {
@@ -521,7 +525,7 @@ pub(super) mod tests {
             refused: None,
             ..NOTHING
         };
-        let said = nothing_missing(&told, false);
+        let said = nothing_missing(&told, false, false);
         assert_eq!(
             said[0],
             "With the values of the text, no effect of the library improves the fit significantly, but the residual is not white \
@@ -535,7 +539,7 @@ pub(super) mod tests {
             refused: None,
             ..NOTHING
         };
-        assert!(!nothing_missing(&told, false)[0].contains("white"));
+        assert!(!nothing_missing(&told, false, false)[0].contains("white"));
     }
 
     #[test]
@@ -550,7 +554,7 @@ pub(super) mod tests {
             differs: Differs::Together(test),
             ..NOTHING
         };
-        let said = nothing_missing(&told, false).join(" ");
+        let said = nothing_missing(&told, false, false).join(" ");
         assert!(!said.contains("with the values of the text"), "{said}");
         assert!(
             said.contains("chi-square 312.0, 4 degrees of freedom, p < 1e-12"),
@@ -567,8 +571,8 @@ pub(super) mod tests {
             differs: Differs::Parameters,
             ..NOTHING
         };
-        assert!(nothing_missing(&told, false)[0].ends_with("nothing is missing in them."));
-        assert!(!nothing_missing(&told, true)[0].contains("nothing is missing"));
+        assert!(nothing_missing(&told, false, false)[0].ends_with("nothing is missing in them."));
+        assert!(!nothing_missing(&told, true, false)[0].contains("nothing is missing"));
         assert!(
             bounds_in_words(&bounds, &told)
                 .unwrap()
