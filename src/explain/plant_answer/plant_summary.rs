@@ -511,7 +511,9 @@ pub(super) mod tests {
 
     #[test]
     fn a_residual_that_is_not_white_is_not_called_noise() {
-        let white = nothing_missing(&NOTHING, false);
+        let hidden = nothing_missing(&NOTHING, false, true);
+        assert!(!hidden[0].contains("white"), "{hidden:?}");
+        let white = nothing_missing(&NOTHING, false, false);
         assert_eq!(
             white,
             [
