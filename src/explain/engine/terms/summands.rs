@@ -13,6 +13,8 @@ pub(in crate::explain::engine) fn sums_in(
         match spec.expressions.node(id) {
             Node::Binary(Binary::Divide, a, _) => waiting.push(a),
             Node::Binary(Binary::Multiply, a, b) if is_sum(spec, a) != is_sum(spec, b) => {
+                // A term by itself, and a sum with a factor.
+                found.push((id, vec![(1.0, id)]));
                 waiting.push(if is_sum(spec, a) { a } else { b });
             }
             _ => {
