@@ -97,7 +97,7 @@ fn friction_between_two_bodies_enters_both() {
 /// A drag that grows from some time on: without the change the parameter goes to its bound, and a load is as good.
 #[test]
 fn a_parameter_that_went_to_its_bound_changes() {
-    let wind = levels(25, -4.0, 4.0);
+    let wind = levels(25, -8.0, 8.0);
     let log = recorded(
         "wz,alt",
         (1000, 0.2),
@@ -107,7 +107,7 @@ fn a_parameter_that_went_to_its_bound_changes() {
             let air = x[1] - u[0];
             vec![x[1], -9.80665 - 0.5 * 1.1 * area * air * air.abs() / 90.0]
         },
-        (&[2207.0, -22.0], &[(0, 1.5)]),
+        (&[2207.0, -22.0], &[(0, 0.5)]),
     );
     let folder = Folder::new();
     let said = explained(

@@ -7,7 +7,9 @@ use super::fitting::edit::Place;
 use super::fitting::finish::finished;
 use super::fitting::fitted::{Fitted, TIE, forms, order, searched, with_more};
 use super::fitting::formulas::formulas;
-use super::fitting::neighbours::{as_parameter_changes, of_one_variable, richer_form};
+use super::fitting::neighbours::{
+    as_parameter_changes, as_plain_functions, of_one_variable, richer_form,
+};
 use super::fitting::refined_curve::refined_curve;
 use super::fitting::release::released;
 use super::fitting::second_effect::drop_alike;
@@ -448,9 +450,11 @@ pub(super) fn step(stage: &Stage) -> Step {
         let one = fitted.iter().filter(|f| f.hypothesis.is_none());
         if let Some(one) = one.max_by(|a, b| a.gain.total_cmp(&b.gain)) {
             let mut changes = as_parameter_changes(one, given, &screen.arguments, &ground);
+            changes.extend(as_plain_functions(one, &screen.arguments, &ground));
             changes.retain(|f| scope.allows(named(&plant.spec, f)));
             let again = |f: &Fitted| {
-                let same = |c: &Fitted| (c.lead.term, c.lead.place) == (f.lead.term, f.lead.place);
+                let of = |f: &Fitted| (f.lead.term, f.lead.place, f.argument.clone());
+                let same = |c: &Fitted| of(c) == of(f);
                 changes.iter().any(|c| same(c) && c.gain > f.gain)
             };
             fitted.retain(|f| !again(f));

@@ -135,6 +135,27 @@ pub(in crate::explain::engine) fn as_parameter_changes(
     all.filter_map(changed).collect()
 }
 
+/// A function in the place of a parameter as a straight line and as a square: a screen that hardly tells two forms apart keeps one.
+pub(in crate::explain::engine) fn as_plain_functions(
+    fitted: &Fitted,
+    arguments: &[Argument],
+    ground: &Ground,
+) -> Vec<Fitted> {
+    let (Place::Parameter(_), Some(argument)) = (fitted.lead.place, fitted.lead.argument) else {
+        return vec![];
+    };
+    let plain = |t: &&Term| {
+        matches!(t.id, "parameter_curve" | "parameter_square") && **t != *fitted.lead.term
+    };
+    let terms: Vec<&'static Term> = TERMS.iter().filter(plain).collect();
+    let fits = terms.into_par_iter().filter_map(|term| {
+        let (what, start) = ((term, Some(argument)), (&[][..], 0.0));
+        let glanced = in_its_place(fitted, what, start, &glance, arguments, ground)?;
+        thoroughly(glanced, ground)
+    });
+    fits.collect()
+}
+
 fn glance(study: &Study, from: &Fit) -> Option<Fit> {
     study.glance(from, GLANCE)
 }
