@@ -167,8 +167,12 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
     let listed = TERMS.iter().filter(|term| {
         let is_function = term.memories.is_empty() && term.free_strength;
         let another = *term != best.lead.term;
-        let fits = in_equation && term.port == Port::Equation && argument.serves(term.needs);
-        is_function && another && fits
+        let at_place = match best.lead.place {
+            Place::Equation(_) => term.port == Port::Equation,
+            Place::Parameter(_) => term.port == Port::Parameter,
+            Place::Input(_) => false,
+        };
+        is_function && another && at_place && argument.serves(term.needs)
     });
     let instances: Vec<Instance> = FORMULAS
         .iter()
