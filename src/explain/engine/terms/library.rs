@@ -296,7 +296,7 @@ pub(crate) const TERMS: &[Term] = &[
         "parameter_square",
         Parameter,
         Anything,
-        "({z}^2 - {usual}^2)",
+        "({z}^2 - {usual}*{usual})",
         &[],
     ),
     // Gains that go round with an angle: eccentric magnets, gears, cranks.
