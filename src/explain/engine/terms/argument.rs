@@ -125,8 +125,8 @@ impl Argument {
         }
         let digit = 10f64.powf(spread.log10().floor() - 1.0);
         let usual = (middle / digit).round() * digit;
-        // As it is written: without what the multiplication has added.
-        format!("{usual:.12e}").parse().unwrap_or(usual)
+        // As it is written: without what the multiplication has added, nor a sign of zero.
+        format!("{usual:.12e}").parse().unwrap_or(usual) + 0.0
     }
 
     /// Whether it goes back by more than [`BACK`] of its range after it has gone up, and after it has gone down: what remembers the
@@ -464,6 +464,9 @@ mod tests {
             .collect();
         assert_eq!(with_values([warm.clone(), warm]).usual(), 318.4);
         assert_eq!(with_values([vec![5.0; 3], vec![5.0; 3]]).usual(), 5.0);
+        let about_zero = vec![-3.0, -0.001, 3.0];
+        let usual = with_values([about_zero.clone(), about_zero]).usual();
+        assert_eq!(usual.to_string(), "0");
     }
 
     #[test]
