@@ -15,8 +15,8 @@ use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH, l
 use crate::physics::ModelSpec;
 use crate::physics::estimate::{Fit, Study};
 
-/// The richer form of a fit's term that fits best, where that gains what ties do not explain. What the simple form leaves would else be taken
-/// for a second effect.
+/// The richer form of a fit's term that fits best, where that gains what ties do not explain. What the simple form leaves would else
+/// be taken for a second effect.
 pub(in crate::explain::engine) fn richer_form(
     fitted: &Fitted,
     arguments: &[Argument],

@@ -27,7 +27,6 @@ pub(super) const STICTION: Shape = shape(
     Starts::Releases(&[0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0]),
     true,
 );
-pub(super) const GAP: Shape = shape("g", Starts::SizeQuantiles(&[0.3, 0.6, 0.9]), true);
 pub(super) const DEAD_ZONE: Shape = shape("d", Starts::SizeQuantiles(&[0.1, 0.3, 0.5]), true);
 /// A limit on both sides, and an upper one.
 pub(super) const LIMIT: Shape = shape("L", Starts::SizeQuantiles(&[0.6, 0.8, 0.9, 0.97]), true);
@@ -228,7 +227,13 @@ pub(crate) const TERMS: &[Term] = &[
         &[shape("from", Starts::SizeQuantiles(ABOVE), true)],
     ),
     // Play in a spring that the equations have: it takes its force away, up to the gap `g`.
-    curve("gap", Equation, Stretch, "min(max({z}, -{g}), {g})", &[GAP]),
+    curve(
+        "gap",
+        Equation,
+        Stretch,
+        "min(max({z}, -{g}), {g})",
+        &[shape("g", Starts::SizeQuantiles(&[0.3, 0.6, 0.9]), true)],
+    ),
     curve(
         "root_above",
         Equation,
