@@ -9,8 +9,8 @@ use super::record::Log;
 use super::roles::{Missing, RoleNeed, Roles};
 use super::text::{Source, Stream};
 use super::time::{
-    Filled, Origin, Piece, Resampling, Rows, SHORTEST, Tally, check_sample_time, common_step,
-    counted, fill, readable, time_grid,
+    FEW_ROWS, Filled, NEAR, Origin, Piece, Resampling, Rows, SHORTEST, Tally, check_sample_time,
+    common_step, counted, fill, readable, time_grid,
 };
 use crate::limits;
 
@@ -245,14 +245,20 @@ impl Assembly<'_> {
                     rounding: stamps.rounding,
                     same: &same,
                 };
-                let grid = match time_grid::lay(&rows, self.at_gaps(), wanted) {
-                    Err(error) if self.keeps() && wanted.is_none() && error.is_irregular() => {
-                        wanted = Some(common_step(rows.stamps).ok_or(error)?);
+                let mut grid = time_grid::lay(&rows, self.at_gaps(), wanted);
+                let irregular = match &grid {
+                    Err(error) => error.is_irregular(),
+                    Ok(grid) => grid.jitter > NEAR && rows.stamps.len() <= FEW_ROWS,
+                };
+                if self.keeps() && wanted.is_none() && irregular {
+                    let step = common_step(rows.stamps);
+                    if step.is_some() {
+                        wanted = step;
                         said.push("irregular times".to_owned());
-                        time_grid::lay(&rows, Missing::Interpolate, wanted)
+                        grid = time_grid::lay(&rows, Missing::Interpolate, wanted);
                     }
-                    grid => grid,
-                }?;
+                }
+                let grid = grid?;
                 said.extend(grid.said);
                 (grid.pieces, grid.step)
             }

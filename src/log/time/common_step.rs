@@ -3,11 +3,15 @@
 /// A grid has at most as many points, or so many a row.
 const MOST_POINTS: f64 = 10_000.0;
 const MOST_POINTS_A_ROW: f64 = 20.0;
+/// Recordings of at most this many rows may have a grid so fine that no time is far from its point.
+pub(crate) const FEW_ROWS: usize = (MOST_POINTS / MOST_POINTS_A_ROW) as usize;
 /// Remainders below this part of the shortest spacing are rounding.
 const ROUNDING: f64 = 1e-4;
 /// Points to the shortest spacing where times have no common divisor: none is further from its point than a twentieth of it; or to the
 /// median, where a few times are much closer than the others.
 const POINTS_A_SPACING: f64 = 10.0;
+/// Distance of a time from its point on such a grid, at most, in shortest spacings.
+pub(crate) const NEAR: f64 = 0.5 / POINTS_A_SPACING;
 
 /// The greatest common divisor of the spacings of these times in seconds, or a tenth of the shortest where that needs too many
 /// points, or the shortest where it is a tenth of most; none where all need too many. Times that go back begin another recording.

@@ -21,7 +21,7 @@ mod stamped_rows;
 pub(crate) mod stamps;
 pub(crate) mod time_grid;
 
-pub(crate) use common_step::common_step;
+pub(crate) use common_step::{FEW_ROWS, NEAR, common_step};
 pub(crate) use fill::{Filled, SHORTEST, Tally, fill};
 pub(crate) use resample::Resampling;
 pub(crate) use sampling::{STEP_TOLERANCE, Sampling, readable, time_base};

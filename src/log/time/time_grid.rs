@@ -37,6 +37,8 @@ pub(crate) struct Grid {
     pub(crate) pieces: Vec<Piece>,
     /// Sample time in seconds.
     pub(crate) step: f64,
+    /// The largest distance of a stamp from the grid, in samples, without what rounding of the stamps makes of it.
+    pub(crate) jitter: f64,
     pub(crate) said: Vec<String>,
 }
 
@@ -101,6 +103,7 @@ pub(crate) fn lay(
         return Ok(Grid {
             pieces,
             step: rough,
+            jitter: 0.0,
             said,
         });
     }
@@ -139,16 +142,21 @@ pub(crate) fn lay(
         .fold(length, |m, s| m.max(s.abs()));
     let slack = (4.0 * f64::EPSILON * largest + 2.0 * rows.rounding) / samples;
     let step = shortest_within(step, slack.max(3.0 * certain));
-    if let Some(jitter) = worst_jitter(&pieces, step)
-        && jitter > STEP_TOLERANCE + 4.0 * rows.rounding / step
-    {
+    let worst = worst_jitter(&pieces, step).unwrap_or(0.0);
+    let jitter = (worst - 4.0 * rows.rounding / step).max(0.0);
+    if jitter > STEP_TOLERANCE {
         said.push(format!(
             "time stamps off by up to {:.0} % of a sample: placed on a grid of {} s, their mean spacing",
-            100.0 * jitter,
+            100.0 * worst,
             readable(step)
         ));
     }
-    Ok(Grid { pieces, step, said })
+    Ok(Grid {
+        pieces,
+        step,
+        jitter,
+        said,
+    })
 }
 
 type Run = Vec<(usize, f64)>;
