@@ -199,8 +199,9 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
                 f(heldout.augmented.fit_percent)
             ),
         };
-        // Where tests find something in what is left, it is not noise alone.
-        let allows = match e.remaining.p_value >= WHITE {
+        // Where tests find something in what is left, it is not noise alone, nor where the simulator is not known.
+        let is_known = e.model.as_ref().is_none_or(|m| m.reference.is_none());
+        let allows = match is_known && e.remaining.p_value >= WHITE {
             true => format!("; noise allows {}", f(heldout.noise_floor.fit_percent)),
             false => String::new(),
         };

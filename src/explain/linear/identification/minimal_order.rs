@@ -219,7 +219,9 @@ fn without_idle_inputs(data: &Data, mut found: Simplest, tolerance: f64) -> Simp
     found
 }
 
-/// Root mean square of what rounding to the digits of a file has taken off: of each decade of size, the finest step.
+/// Root mean square of what rounding to the digits of a file has taken off: of each decade of size, the finest step. A decade of few
+/// values may show fewer digits than the file has (`1` for 1.00000): those of other decades count, with as many decimals where these
+/// are of larger values, and as many digits where they are of smaller ones.
 fn rounding(column: &[f64]) -> f64 {
     let mut finest: Vec<(i32, i32)> = Vec::new();
     let decade = |v: f64| v.abs().log10().floor() as i32;
@@ -234,11 +236,17 @@ fn rounding(column: &[f64]) -> f64 {
             None => finest.push((decade(*v), decimals)),
         }
     }
+    let known = |of: i32| {
+        let each = finest
+            .iter()
+            .map(|(other, most)| most - (of - other).max(0));
+        each.max()
+    };
     let squares: f64 = column
         .iter()
         .filter(|v| **v != 0.0)
-        .filter_map(|v| finest.iter().find(|(of, _)| *of == decade(*v)))
-        .map(|(_, decimals)| 10f64.powi(-2 * decimals) / 12.0)
+        .filter_map(|v| known(decade(*v)))
+        .map(|decimals| 10f64.powi(-2 * decimals) / 12.0)
         .sum();
     (squares / column.len().max(1) as f64).sqrt()
 }
@@ -295,7 +303,15 @@ mod tests {
         let three: Vec<f64> = (0..1000)
             .map(|k| (f64::from(k) * 1.2345).round() * 1e-3)
             .collect();
-        assert!((rounding(&three) / (1e-3 / 12f64.sqrt()) - 1.0).abs() < 0.05);
+        let step = 1e-3 / 12f64.sqrt();
+        assert!((rounding(&three) / step - 1.0).abs() < 0.05);
+        // One value of a larger decade without a fraction, at three decimals and at three digits.
+        let mut small: Vec<f64> = three.iter().map(|v| 0.1 + 0.7 * v.fract()).collect();
+        small
+            .iter_mut()
+            .for_each(|v| *v = (*v * 1e3).round() * 1e-3);
+        small[0] = 1.0;
+        assert!((rounding(&small) / step - 1.0).abs() < 0.1);
     }
 
     #[test]
