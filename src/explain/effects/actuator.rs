@@ -126,6 +126,22 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: widths,
     },
     Definition {
+        id: "input_backlash",
+        variant: "from its gap",
+        name: "backlash (play) at the input",
+        equation: "u_eff follows u when u has moved by the gap, and is somewhere in it when the recording begins",
+        parameters: &[
+            Parameter::positive("half_gap", Unit::Input),
+            Parameter::between("start_in_gap", Unit::Ratio, -1.0, 1.0),
+        ],
+        mimics: &[],
+        linear: &[],
+        persists: true,
+        action: Action::Input(play_from_gap),
+        // Grows out of the one that begins in the middle.
+        starts: |_| Vec::new(),
+    },
+    Definition {
         id: "valve_stiction",
         variant: "",
         name: "stiction of the actuator, which stays and then jumps,",
@@ -161,7 +177,10 @@ pub(super) static ENTRIES: &[Definition] = &[
         linear: &[0],
         persists: true,
         action: Action::Input(asymmetry),
-        starts: |_| vec![vec![0.05]],
+        starts: |seen| match both_signs(&seen.channel) {
+            true => vec![vec![0.05]],
+            false => vec![],
+        },
     },
     Definition {
         id: "input_saturation",
@@ -245,12 +264,19 @@ fn dead_zone(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
 
 fn play(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
     // At rest in the middle of the gap when the recording begins.
-    let mut held = 0.0;
-    if let Some(first) = u.first() {
-        held = *first - first.clamp(-p[0], p[0]);
-    }
+    let first = u.first().copied().unwrap_or(0.0);
+    carry(p[0], first - first.clamp(-p[0], p[0]), u);
+}
+
+fn play_from_gap(p: &[f64], u: &mut [f64], _: &mut [Moments], _: &Clock) {
+    let first = u.first().copied().unwrap_or(0.0);
+    carry(p[0], first + p[1] * p[0], u);
+}
+
+/// What is carried along at the ends of a gap, from where it is at the beginning.
+fn carry(half_gap: f64, mut held: f64, u: &mut [f64]) {
     for u in u {
-        held = f64::clamp(held, *u - p[0], *u + p[0]);
+        held = f64::clamp(held, *u - half_gap, *u + half_gap);
         *u = held;
     }
 }
@@ -279,6 +305,11 @@ fn reached(seen: &Observed) -> Vec<Vec<f64>> {
     [0.4, 0.6, 0.75, 0.85, 0.93, 0.97, 0.99]
         .map(|q| vec![below_the_top(&seen.channel, q).max(1e-12)])
         .to_vec()
+}
+
+/// Whether both signs occur: of an input of one sign a gain that depends on the sign is a gain.
+fn both_signs(values: &[f64]) -> bool {
+    values.iter().any(|v| *v < 0.0) && values.iter().any(|v| *v > 0.0)
 }
 
 /// A level that some of the samples exceed: the quantile, or, where the top is a plateau, a share of it.

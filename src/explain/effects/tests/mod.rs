@@ -258,6 +258,20 @@ fn backlash_is_carried_along_at_the_ends_of_its_gap() {
 }
 
 #[test]
+fn backlash_begins_where_it_is_in_its_gap() {
+    let u = [0.5, 0.4, 0.9, 1.4, 0.7, 0.3];
+    for (start, wanted) in [
+        (-1.0, [0.1, 0.1, 0.5, 1.0, 1.0, 0.7]),
+        (1.0, [0.9, 0.8, 0.8, 1.0, 1.0, 0.7]),
+    ] {
+        let (found, _) = driven("input_backlash", "from its gap", &[0.4, start], &u);
+        for (found, wanted) in found.iter().zip(wanted) {
+            assert_abs_diff_eq!(*found, wanted, epsilon = 1e-12);
+        }
+    }
+}
+
+#[test]
 fn a_gain_changes_within_the_interval_of_its_time() {
     // The interval that holds the change has it for a quarter.
     let change = 2.0 + 1.75 * STEP;

@@ -381,7 +381,7 @@ impl Answer<'_> {
             .map(|r| {
                 let why_not = if unlikely && named.contains(&r.definition.id) {
                     format!(
-                        "of names that lead by so little two of three are wrong (evidence {})",
+                        "of names with so small a lead, or beside so much structure, two of three are wrong (evidence {})",
                         sentences::number(r.gain)
                     )
                 } else if unexplained {

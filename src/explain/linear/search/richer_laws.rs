@@ -30,8 +30,8 @@ pub(crate) enum More {
     Samples(&'static [f64]),
     /// Shares of the travel.
     Travel(&'static [f64]),
-    /// Plain numbers.
-    Plain(&'static [f64]),
+    /// Plain numbers from each of these, however far the simple form is from the best.
+    Each(&'static [&'static [f64]]),
 }
 
 pub(crate) const REFINEMENTS: &[Refinement] = &[
@@ -84,7 +84,13 @@ pub(crate) const REFINEMENTS: &[Refinement] = &[
         simple: ("cubic_stiffness", ""),
         rich: ("cubic_stiffness", "off centre"),
         // Where the simple one is: about zero, in the middle of the interval.
-        more: More::Plain(&[0.0, 0.5]),
+        more: More::Each(&[&[0.0, 0.5]]),
+    },
+    // From the middle of its gap play may be far from where it was for some time.
+    Refinement {
+        simple: ("input_backlash", ""),
+        rich: ("input_backlash", "from its gap"),
+        more: More::Each(&[&[-0.9], &[0.9]]),
     },
     Refinement {
         simple: ("input_delay", ""),
@@ -180,7 +186,7 @@ pub(crate) fn derived(
             .collect();
         simple_fits.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
         let best = match refinement.more {
-            More::Nothing => simple_fits.first().copied(),
+            More::Nothing | More::Each(_) => simple_fits.first().copied(),
             _ => simple_fits
                 .first()
                 .copied()
@@ -195,7 +201,7 @@ pub(crate) fn derived(
         }
         let starts: Vec<Vec<f64>> = match &refinement.more {
             More::Nothing => vec![vec![]],
-            More::Plain(numbers) => vec![numbers.to_vec()],
+            More::Each(starts) => starts.iter().map(|numbers| numbers.to_vec()).collect(),
             More::Numbers(numbers) => numbers.iter().map(|v| vec![v.ln()]).collect(),
             More::Samples(samples) => samples
                 .iter()
