@@ -199,7 +199,7 @@ fn released(plant: &Plant, study: &Study) -> Plant {
 }
 
 /// Options under which every parameter is free.
-pub(super) fn all_free(plant: &Plant, hold: Hold, estimator: Estimator) -> EstimateOptions {
+pub(crate) fn all_free(plant: &Plant, hold: Hold, estimator: Estimator) -> EstimateOptions {
     EstimateOptions {
         free: vec![true; plant.spec.parameters().len()],
         hold,

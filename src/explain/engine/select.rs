@@ -403,16 +403,16 @@ fn by_least_squares(
     };
     let fit = (from_likelihood.iter().cloned().chain(otherwise))
         .min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
-    let refuted = |other: &&[f64]| refutes(&study, &fit, other).unwrap_or(false);
+    let refuted = |other: &&[f64]| agreement(&study, &fit, other).is_some_and(|p| p < MISSPECIFIED);
     let refuted = others.iter().map(refuted).collect();
     let nearest = from_likelihood.filter(|near| study.follows(near));
     study.follows(&fit).then_some((fit, refuted, nearest))
 }
 
-/// Whether other values of the same parameters are worse than two estimates can differ (J. A. Hausman, *Econometrica* 46, 1978:
+/// How probable it is by chance that other values of the same parameters are so much worse (J. A. Hausman, *Econometrica* 46, 1978:
 /// where both are consistent, the excess of the sum of squares over its minimum, in units of the noise, is at most chi-square with a
 /// degree of freedom for each parameter).
-fn refutes(study: &Study, least_squares: &Fit, point: &[f64]) -> Option<bool> {
+pub(crate) fn agreement(study: &Study, least_squares: &Fit, point: &[f64]) -> Option<f64> {
     let numbers = least_squares.point.len();
     let square = |point: &[f64]| -> Option<f64> {
         let fit = Fit {
@@ -426,7 +426,7 @@ fn refutes(study: &Study, least_squares: &Fit, point: &[f64]) -> Option<bool> {
     let excess = square(point)? - square(&least_squares.point)?;
     let share = study.effective_share(least_squares)?;
     let law = ChiSquared::new(numbers as f64).ok()?;
-    Some(law.sf(share * excess.max(0.0)) < MISSPECIFIED)
+    Some(law.sf(share * excess.max(0.0)))
 }
 
 #[cfg(test)]

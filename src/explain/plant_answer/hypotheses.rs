@@ -63,7 +63,10 @@ impl Answer<'_> {
             parameters: BTreeMap::new(),
             rivals: vec![],
             fit: None,
-            sentence: "The plant with it cannot be simulated over the recording.".to_owned(),
+            sentence: match self.too_short(hypothesis.numbers().len()) {
+                Some(short) => format!("The recording is too short for it: {short}."),
+                None => "The plant with it cannot be simulated over the recording.".to_owned(),
+            },
         };
         let Some(own) = own else {
             return found;

@@ -18,8 +18,9 @@ pub use simulate_explained::{AugmentedPlantError, Original};
 
 use nalgebra::DMatrix;
 
+use self::judgement::doubt::{Doubt, doubt};
 use self::judgement::free_run::astray;
-use self::judgement::joint_test::joint_test;
+use self::judgement::joint_test::{LEVEL, joint_test};
 use self::judgement::stated_probability::probability;
 use self::nearest_to_text::nearest_to_text;
 use self::plant_summary::{Differs, Told, as_good};
@@ -28,11 +29,11 @@ use self::within_bounds::within_bounds;
 
 use super::engine::fitting::fitted::{Fitted, tie_with_curve};
 use super::engine::fitting::initial_states::with_free_states;
-use super::engine::holdout::{EXPLAINED, blocks};
+use super::engine::holdout::{EXPLAINED, Estimator, all_free, as_given, blocks};
 use super::engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
 use super::engine::scope::Scope;
 use super::engine::search::Found;
-use super::engine::select::{CHANCE, select};
+use super::engine::select::{CHANCE, agreement, select};
 use super::engine::shared_terms::with_shared_terms;
 use super::engine::terms::term::{Needs, Port, Shape};
 use super::engine::thresholds::{LEFT, SURE, chance};
@@ -42,7 +43,9 @@ use super::explanation::{
 };
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
-use crate::physics::estimate::{EstimateOptions, PlantRecording, Study};
+use crate::physics::estimate::{
+    EstimateError, EstimateOptions, PlantRecording, Study, VALUES_A_NUMBER,
+};
 use crate::physics::{Hold, ModelSpec, Plant, Span, units_in_words};
 
 /// A parameter is said to differ from the text where it does by so many standard deviations.
@@ -197,6 +200,7 @@ impl Answer<'_> {
         let sure = (gain >= SURE || proved)
             && follows
             && self.effects().all(|fitted| self.is_significant(fitted))
+            && self.effects().all(|fitted| self.doubt(fitted).is_none())
             && better
             && (adequate || explains && !curves);
         let runs = self.free_runs();
@@ -283,6 +287,7 @@ impl Answer<'_> {
             strays,
             astray,
             refused,
+            too_short: self.too_short(1),
         });
         // What is not sure predicts a fresh recording only where it makes blocks left out better, as a name must. Blocks between others
         // say nothing of what a load or a parameter does later.
@@ -398,6 +403,21 @@ impl Answer<'_> {
         fitted.hypothesis.is_some() || test.is_none_or(|t| t.p_value < SIGNIFICANT)
     }
 
+    /// What else an effect may be.
+    fn doubt(&self, fitted: &Fitted) -> Option<Doubt> {
+        if fitted.hypothesis.is_some() {
+            return None;
+        }
+        let shapes = fitted.lead.term.shapes.iter();
+        let mut with_places = shapes.zip(self.parameters_of(fitted));
+        let at = with_places.find(|(shape, _)| shape.is_instant());
+        let instant = at.map(|(_, (_, at))| {
+            let variance = self.within_bounds[(at, at)];
+            (self.found.fit.point[at], variance.max(0.0).sqrt())
+        });
+        doubt(fitted, instant, &self.plant.spec, self.recordings)
+    }
+
     /// The plant as it ran over the first recording, with what was found where that may be relied on. A fresh recording starts elsewhere:
     /// no start is certain.
     fn text(&self, relied_on: bool) -> String {
@@ -479,9 +499,29 @@ impl Answer<'_> {
         let starts = || joint_test(&shift, &self.covariance).is_some_and(|t| t.rejects());
         let differs = match together {
             Some(test) if test.rejects() => Differs::Together(test),
+            // Where estimates stop at bounds, the covariance says nothing of them.
+            _ if self.refutes_text() => Differs::Parameters,
             _ if starts() => Differs::Starts,
             _ => Differs::No,
         };
         (differs, together)
+    }
+
+    /// Why a term with so many parameters cannot be fitted, where the recordings have too few values.
+    fn too_short(&self, more: usize) -> Option<EstimateError> {
+        let (free, samples) = (self.base.nominal().len() + more, self.base.count());
+        (samples <= VALUES_A_NUMBER * free).then_some(EstimateError::TooShort { free, samples })
+    }
+
+    /// Whether the recording refutes the values of the text, with initial states of their own, in free run.
+    fn refutes_text(&self) -> bool {
+        let p_value = || {
+            let given = as_given(self.plant, self.recordings, self.hold)?;
+            let options = all_free(self.plant, self.hold, Estimator::FreeRun);
+            let study = Study::new(self.plant, self.recordings, &options).ok()?;
+            let fit = study.least_squares(&given.point)?;
+            agreement(&study, &fit, &given.point)
+        };
+        p_value().is_some_and(|p| p < LEVEL)
     }
 }

@@ -12,7 +12,7 @@ use crate::explain::engine::fitting::fitted::Fitted;
 use crate::explain::engine::hypothesis::Hypothesis;
 use crate::explain::engine::screening::curve::Curve;
 use crate::explain::engine::terms::term::{Port, Starts};
-use crate::explain::engine::terms::values::filled;
+use crate::explain::engine::terms::values::{about_usual, filled};
 use crate::explain::engine::thresholds::NEEDED;
 use crate::explain::explanation::{Alternative, EffectFound, Evidence, Law, Quantity};
 use crate::physics::{Excitation, Hold, Plant, VariableId, parse};
@@ -325,9 +325,8 @@ impl Answer<'_> {
                     [one] => fitted.argument.replace(one, "z"),
                     _ => "z".to_owned(),
                 };
-                let form = filled(term.form, term, &argument, &[], &shapes, 1.0)
-                    .replace("{usual}", &format!("({:e})", fitted.usual));
-                format!("{strength}*({form})")
+                let form = filled(term.form, term, &argument, &[], &shapes, 1.0);
+                format!("{strength}*({})", about_usual(&form, fitted.usual))
             }
         };
         let text = format!("model Law input Real z; output Real y; equation y = {text}; end Law;");

@@ -12,7 +12,7 @@ use crate::explain::engine::thresholds::{LEFT, NEEDED, SURE};
 use crate::explain::explanation::{
     Alternative, EffectFound, FitSteps, JointTest, OutputFit, ParameterChange, Quantity, Verdict,
 };
-use crate::physics::estimate::PlantRecording;
+use crate::physics::estimate::{EstimateError, PlantRecording};
 use crate::physics::{Equation, VariableId};
 
 /// Rivals that the summary lists.
@@ -48,6 +48,8 @@ pub(super) struct Told<'a> {
     pub(super) astray: Option<Astray>,
     /// What the criterion is sure of, but blocks left out refuse.
     pub(super) refused: Option<&'a Alternative>,
+    /// Why no term can be added, where the recording is too short.
+    pub(super) too_short: Option<EstimateError>,
 }
 
 impl Answer<'_> {
@@ -112,6 +114,7 @@ impl Answer<'_> {
                 lines.extend(self.found.map.as_ref().and_then(places));
                 for (effect, fitted) in told.effects.iter().zip(self.effects()) {
                     lines.push(closest(effect));
+                    lines.extend(self.doubt(fitted).map(|doubt| doubt.to_string()));
                     lines.extend(self.estimates(
                         fitted,
                         effect,
@@ -128,7 +131,7 @@ impl Answer<'_> {
         lines.extend(bounds_in_words(&bounds.determined, told));
         lines.extend((!bounds.undetermined.is_empty()).then(|| {
             format!(
-                "At a bound of the text, because the recording hardly determines it: {}.",
+                "At a bound of the text, and the recording alone says less of it than its bounds: {}.",
                 bounds.undetermined.join(", ")
             )
         }));
@@ -208,7 +211,11 @@ fn nothing_missing(told: &Told, at_bound: bool, hidden: bool) -> Vec<String> {
         true => "no effect of the library improves the fit significantly",
         false => "no effect of the library improves simulations of held-out blocks",
     };
-    let mut lines = vec![if told.p_value < LEFT {
+    let mut lines = vec![if let Some(short) = &told.too_short {
+        format!(
+            "Effects were not searched for, because the recording is too short: with one more, {short}."
+        )
+    } else if told.p_value < LEFT {
         format!(
             "With {with}, {no_effect}, but the residual is not white ({}).",
             p_value(told.p_value)
@@ -478,6 +485,7 @@ pub(super) mod tests {
         strays: 1.1,
         astray: None,
         refused: None,
+        too_short: None,
     };
 
     #[test]
@@ -525,6 +533,7 @@ pub(super) mod tests {
             strays: 6.3,
             astray: None,
             refused: None,
+            too_short: None,
             ..NOTHING
         };
         let said = nothing_missing(&told, false, false);
@@ -539,6 +548,7 @@ pub(super) mod tests {
             strays: 6.3,
             astray: None,
             refused: None,
+            too_short: None,
             ..NOTHING
         };
         assert!(!nothing_missing(&told, false, false)[0].contains("white"));

@@ -20,6 +20,7 @@ mod study;
 pub use adequacy::{Question, ResidualTest};
 pub use determined::Undetermined;
 pub use evaluate::{Evaluation, Held, HeldNoise, evaluate, start_by_least_squares};
+pub(crate) use problem::VALUES_A_NUMBER;
 pub use problem::{EstimateError, PlantRecording};
 pub(crate) use study::Study;
 

@@ -16,6 +16,9 @@ use crate::physics::simulation::{
 };
 use crate::physics::spec::{ModelSpec, VariableKind};
 
+/// Recordings must have more values than so many for each free parameter and initial state.
+pub(crate) const VALUES_A_NUMBER: usize = 2;
+
 /// A recording of a plant.
 #[derive(Debug, Clone)]
 pub struct PlantRecording {
@@ -258,7 +261,7 @@ impl<'a> Problem<'a> {
         };
         let free = problem.nominal().len();
         let samples = problem.count();
-        if samples <= 2 * free {
+        if samples <= VALUES_A_NUMBER * free {
             return Err(EstimateError::TooShort { free, samples });
         }
         let plant = problem.plant.clone();

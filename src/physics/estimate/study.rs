@@ -281,6 +281,22 @@ impl<'a> Study<'a> {
         (0..fit.point.len()).filter(inside).collect()
     }
 
+    /// A fit with those of the first numbers that have gone to a bound back at the values of the text; none where none has. What makes up
+    /// for something that is missing stays at its bound while a term is weak.
+    pub(crate) fn off_bounds(&self, from: &Fit, numbers: usize) -> Option<Fit> {
+        let (inside, nominal) = (self.inside(from), self.nominal());
+        let mut point = from.point.clone();
+        let mut moved = false;
+        for i in (0..numbers).filter(|i| !inside.contains(i)) {
+            moved |= point[i] != nominal[i];
+            point[i] = nominal[i];
+        }
+        moved.then(|| Fit {
+            point,
+            ..from.clone()
+        })
+    }
+
     /// The numbers moved, within their bounds.
     pub(crate) fn moved(&self, fit: &Fit, shift: &[f64]) -> Vec<f64> {
         let ranges = self.problem.ranges();

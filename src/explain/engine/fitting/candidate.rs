@@ -4,7 +4,7 @@ use crate::explain::engine::fitting::edit::{Edit, NewParameter, Place, acting};
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::term::{Port, Starts};
-use crate::explain::engine::terms::values::filled;
+use crate::explain::engine::terms::values::{about_usual, filled};
 use crate::explain::engine::thresholds::{GLANCED_ACCURACY, limited};
 use crate::physics::estimate::{Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Node, Plant};
@@ -119,14 +119,8 @@ pub(crate) fn candidate(
             format!("({})", &spec.text[span.start..span.end])
         },
     );
-    let usual = argument.map_or(0.0, Argument::usual);
-    let usual = match usual < 0.0 {
-        true => format!("({usual})"),
-        false => usual.to_string(),
-    };
-    let body = filled(term.form, term, &text, &memories, &shapes, h)
-        .replace("{a}", &factor)
-        .replace("{usual}", &usual);
+    let body = filled(term.form, term, &text, &memories, &shapes, h).replace("{a}", &factor);
+    let body = about_usual(&body, argument.map_or(0.0, Argument::usual));
     let rate = argument.and_then(|a| a.rate.as_deref());
     let body = match body.contains("{dz}") {
         true => body.replace("{dz}", rate?),

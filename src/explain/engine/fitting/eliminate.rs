@@ -59,9 +59,6 @@ pub(in crate::explain::engine) fn alone(
     };
     let lead = second.lead.clone().at(place, argument, &second.shapes);
     let made = candidate(spec, &lead, &arguments, recordings)?;
-    if second.fit.form != baseline.form {
-        return None;
-    }
     // From the numbers of both: those of the plant, with those of the second alone.
     let own = study.parameters();
     let dropped = first.candidate.values.len();

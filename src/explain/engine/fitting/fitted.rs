@@ -37,6 +37,8 @@ pub(crate) struct Fitted {
     pub(crate) travel: f64,
     /// A usual value of the argument.
     pub(crate) usual: f64,
+    /// Whether the argument goes back through its range: a function of one that does not is also one of time.
+    pub(crate) comes_back: bool,
     /// Fitted values of the shapes.
     pub(crate) shapes: Vec<f64>,
     pub(crate) candidate: Candidate,
@@ -76,8 +78,16 @@ impl Fitted {
             range: (argument.quantile(0.0), argument.quantile(1.0)),
             travel: (recordings.first()).map_or(0.0, |r| argument.travel(r.sample_time)),
             usual: argument.usual(),
+            comes_back: argument.reverses(),
             ..self
         }
+    }
+
+    /// Whether the times of its term are within a recording of this length: what follows more slowly is a ramp there, or a constant.
+    pub(in crate::explain::engine) fn is_resolved(&self, length: f64) -> bool {
+        let mut times =
+            (self.lead.term.shapes.iter().zip(&self.shapes)).filter(|(s, _)| s.is_duration());
+        times.all(|(_, time)| *time <= length)
     }
 
     /// The factor of a term whose size its shapes do not fix.
@@ -138,7 +148,8 @@ pub(in crate::explain::engine) fn searched(lead: &Lead, recordings: &[PlantRecor
         .iter()
         .map(|shape| match shape.starts {
             Starts::Length(_) | Starts::Instants(_) => 2.0 * (samples / 20.0).ln(),
-            Starts::Waves(_) => 7.0,
+            // As many as are tried of a position.
+            Starts::Waves(_) => 2.0 * 47f64.ln(),
             // As many frequencies as the spectrum of the recording has.
             Starts::Peaks => 2.0 * (samples / 2.0).ln(),
             // As many as are tried: see `Screen`.

@@ -16,6 +16,9 @@ use crate::explain::engine::terms::values::{Instance, evaluate, grid};
 use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::{Fit, Study};
 
+/// Id of all of these terms.
+pub(in crate::explain::engine) const FORMULA: &str = "formula";
+
 const WIDTHS: Starts = Starts::Spread(&[0.1, 0.2, 0.5, 1.0, 2.0]);
 const MIDDLES: Starts = Starts::Quantiles(&[0.1, 0.3, 0.5, 0.7, 0.9]);
 const POWERS: Starts = Starts::Values(&[0.5, 1.5, 2.5, 4.0]);
@@ -51,7 +54,7 @@ const fn law(
     form: &'static str,
     shapes: &'static [crate::explain::engine::terms::term::Shape],
 ) -> Term {
-    curve("formula", Port::Equation, Needs::Anything, form, shapes)
+    curve(FORMULA, Port::Equation, Needs::Anything, form, shapes)
 }
 
 /// A formula for the curve, with its start.
@@ -230,7 +233,7 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
     found.sort_by(|a, b| a.left.total_cmp(&b.left));
     let mut kept = [0; 2];
     found.retain(|near| {
-        let is_formula = near.term.id == "formula";
+        let is_formula = near.term.id == FORMULA;
         let (count, most) = match is_formula {
             true => (&mut kept[0], FITTED),
             false => (&mut kept[1], LISTED),

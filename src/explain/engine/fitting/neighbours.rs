@@ -9,11 +9,11 @@ use crate::explain::engine::hypothesis::Ground;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::TERMS;
 use crate::explain::engine::terms::richer::richer;
-use crate::explain::engine::terms::term::Term;
+use crate::explain::engine::terms::term::{Needs, Port, Term, curve};
 use crate::explain::engine::terms::values::starts;
 use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH, limited};
 use crate::physics::ModelSpec;
-use crate::physics::estimate::{Fit, Study};
+use crate::physics::estimate::{Fit, PlantRecording, Study};
 
 /// The richer form of a fit's term that fits best, where that gains what ties do not explain. What the simple form leaves would else
 /// be taken for a second effect.
@@ -84,58 +84,107 @@ pub(in crate::explain::engine) fn of_one_variable(
     clearly_better(fitted, glanced, ground)
 }
 
-/// Parts of a parameter by which it may change.
+/// Parts of a parameter by which it may change, and of the recording's length at which.
 const CHANGES: [f64; 2] = [-0.3, 0.3];
+const WHEN: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 
-/// A load that begins at some time, as a change of each parameter of its equation from then on. From the plant without it a fit may not
-/// get there, where parameters have gone to their bounds to make up for it.
+/// What begins at some time, or drifts, as a change of each parameter of its equations: a load as one that begins when it does, and a
+/// change of a parameter as one of the others. From the plant without it a fit may not get there, where parameters have gone to their
+/// bounds to make up for it.
 pub(in crate::explain::engine) fn as_parameter_changes(
     fitted: &Fitted,
     given: &ModelSpec,
     arguments: &[Argument],
     ground: &Ground,
 ) -> Vec<Fitted> {
-    let id = match fitted.lead.term.id {
-        "load_step" => "parameter_step",
-        "load_ramp" => "parameter_ramp",
+    let ids: &[&str] = match fitted.lead.term.id {
+        "load_step" => &["parameter_step"],
+        "load_ramp" => &["parameter_ramp"],
+        "parameter_step" | "parameter_ramp" => &["parameter_step", "parameter_ramp"],
         _ => return vec![],
     };
-    let term = TERMS.iter().find(|term| term.id == id);
+    let terms = TERMS.iter().filter(|term| ids.contains(&term.id));
     let spec = &ground.plant.spec;
     let parameters = spec.parameters();
-    let of_equation = |place: &Place| match *place {
-        Place::Parameter(v) => fitted.lead.place.uses(spec, v),
+    let all = places(spec, given);
+    let there = fitted.lead.place;
+    let equations: Vec<Place> = match there {
+        Place::Parameter(v) => {
+            let uses = |e: &Place| matches!(e, Place::Equation(_)) && e.uses(spec, v);
+            all.iter().copied().filter(uses).collect()
+        }
+        place => vec![place],
+    };
+    let beside = |place: &Place| match *place {
+        Place::Parameter(v) => *place != there && equations.iter().any(|e| e.uses(spec, v)),
         _ => false,
     };
-    let places: Vec<Place> = places(spec, given)
+    let (begin, end) = PlantRecording::span(ground.recordings);
+    let own = fitted.lead.term.shapes.iter().zip(&fitted.shapes);
+    let own = own
         .into_iter()
-        .filter(of_equation)
-        .collect();
+        .find(|(s, _)| s.is_instant())
+        .map(|(_, t)| *t);
+    let instants = |term: &Term| -> Vec<Vec<f64>> {
+        match (term.shapes, own) {
+            ([], _) => vec![vec![]],
+            (_, Some(own)) => vec![vec![own]],
+            _ => (WHEN.iter().map(|part| vec![begin + part * (end - begin)])).collect(),
+        }
+    };
+    let off_bounds = ground
+        .study
+        .off_bounds(&fitted.fit, given.parameters().len());
+    let off_bounds = off_bounds.map(|fit| Fitted {
+        fit,
+        ..fitted.clone()
+    });
+    let froms: Vec<&Fitted> = [fitted].into_iter().chain(&off_bounds).collect();
     let changed = |(term, place): (&'static Term, Place)| {
         let at = parameters.iter().position(|&p| p == place.variable(spec))?;
-        let value = *fitted.fit.point.get(at)?;
-        let glanced = CHANGES.into_par_iter().filter_map(|part| {
-            let start = (&fitted.shapes[..], part * value);
-            at_place(
-                fitted,
-                place,
-                (term, None),
-                start,
-                &glance,
-                arguments,
-                ground,
-            )
-        });
+        let of_from = |from: &&'_ Fitted| -> Vec<(Vec<f64>, f64)> {
+            let value = from.fit.point.get(at).copied().unwrap_or(0.0);
+            let all = instants(term).into_iter();
+            all.flat_map(|t| CHANGES.map(|part| (t.clone(), part * value)))
+                .collect()
+        };
+        let starts: Vec<(&Fitted, (Vec<f64>, f64))> = (froms.iter())
+            .flat_map(|from| of_from(from).into_iter().map(|start| (*from, start)))
+            .collect();
+        let glanced = starts
+            .into_par_iter()
+            .filter_map(|(from, (shapes, strength))| {
+                at_place(
+                    from,
+                    place,
+                    (term, None),
+                    (&shapes, strength),
+                    &glance,
+                    arguments,
+                    ground,
+                )
+            });
         let best = glanced.min_by(|a, b| a.fit.deviance.total_cmp(&b.fit.deviance))?;
         thoroughly(best, ground)
     };
-    let all = term
-        .into_par_iter()
-        .flat_map(|t| places.par_iter().map(move |p| (t, *p)));
-    all.filter_map(changed).collect()
+    let pairs: Vec<(&'static Term, Place)> = terms
+        .flat_map(|t| all.iter().filter(|p| beside(p)).map(move |p| (t, *p)))
+        .collect();
+    pairs.into_par_iter().filter_map(changed).collect()
 }
 
-/// A function in the place of a parameter as a straight line and as a square: a screen that hardly tells two forms apart keeps one.
+/// The size of a variable as what a parameter depends on: the saturation of iron is the same for both signs of a current.
+const SIZE: Term = curve(
+    "parameter_curve",
+    Port::Parameter,
+    Needs::BothSigns,
+    "abs({z})",
+    &[],
+);
+const SIZES: &[Term] = &[SIZE];
+
+/// A function in the place of a parameter as a straight line, as one of the size, and as a square: a screen that hardly tells two forms
+/// apart keeps one.
 pub(in crate::explain::engine) fn as_plain_functions(
     fitted: &Fitted,
     arguments: &[Argument],
@@ -144,10 +193,14 @@ pub(in crate::explain::engine) fn as_plain_functions(
     let (Place::Parameter(_), Some(argument)) = (fitted.lead.place, fitted.lead.argument) else {
         return vec![];
     };
-    let plain = |t: &&Term| {
-        matches!(t.id, "parameter_curve" | "parameter_square") && **t != *fitted.lead.term
-    };
-    let terms: Vec<&'static Term> = TERMS.iter().filter(plain).collect();
+    let plain = |t: &&Term| matches!(t.id, "parameter_curve" | "parameter_square");
+    let new = |t: &&Term| **t != *fitted.lead.term && arguments[argument].serves(t.needs);
+    let terms: Vec<&'static Term> = TERMS
+        .iter()
+        .filter(plain)
+        .chain(SIZES)
+        .filter(new)
+        .collect();
     let fits = terms.into_par_iter().filter_map(|term| {
         let (what, start) = ((term, Some(argument)), (&[][..], 0.0));
         let glanced = in_its_place(fitted, what, start, &glance, arguments, ground)?;
@@ -171,7 +224,7 @@ fn clearly_better(
     if best.fit.deviance > fitted.fit.deviance + fitted.gain {
         return None;
     }
-    let better = thoroughly(best, ground)?;
+    let better = thoroughly(best, ground).filter(|f| f.is_resolved(ground.study.duration()))?;
     (better.gain > fitted.gain + TIE.0).then_some(better)
 }
 

@@ -146,6 +146,7 @@ impl Hypothesis {
             shapes: vec![],
             travel: 0.0,
             usual: 0.0,
+            comes_back: true,
             depends: self.depends.clone(),
             range,
             gain: ground.fit.criterion - fit.criterion - searched,

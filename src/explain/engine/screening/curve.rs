@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::explain::engine::fitting::edit::{Place, literal};
-use crate::explain::engine::screening::path::{Hooked, Path, TOGETHER};
+use crate::explain::engine::screening::path::{Entry, Hooked, Path, TOGETHER};
 use crate::explain::engine::screening::projection::Projection;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::{Argument, ArgumentForm};
@@ -177,7 +177,7 @@ pub(in crate::explain::engine) fn curves(
             .flat_map(|signals| {
                 let entering: Vec<(&Series, &Series)> =
                     signals.iter().map(|[at, end]| (at, end)).collect();
-                path.propagate(hooked.columns[hook], &entering)
+                path.propagate(Entry::Hook(hooked.columns[hook]), &entering)
             })
             .map(|series| {
                 let mut column = whiten(&series);

@@ -24,6 +24,16 @@ struct Steps {
     phi: Vec<f64>,
     c: Vec<f64>,
     of_input: Vec<OfInput>,
+    of_sensor: Vec<OfInput>,
+}
+
+/// Where signals enter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::explain::engine) enum Entry {
+    /// The input of a hooked plant.
+    Hook(usize),
+    /// The output that a sensor shows.
+    Sensor(usize),
 }
 
 /// `A` and `B` from one sample to the next.
@@ -59,6 +69,7 @@ impl Steps {
             phi: vec![],
             c: vec![],
             of_input: (0..inputs).map(|_| empty()).collect(),
+            of_sensor: (0..l).map(|_| empty()).collect(),
         };
         for (k, (plant, (phi, gamma))) in plants.iter().zip(discrete).enumerate() {
             let (c, d) = (plant.c.rows(0, l), plant.d.rows(0, l));
@@ -80,14 +91,24 @@ impl Steps {
                     of.observed.extend((corrected * d.column(j)).iter());
                 }
             }
+            for (o, of) in steps.of_sensor.iter_mut().enumerate() {
+                of.gamma.extend(std::iter::repeat_n(0.0, n));
+                of.d.extend((0..l).map(|other| f64::from(u8::from(other == o))));
+                if let Some(corrected) = &corrected {
+                    of.observed.extend(corrected.column(o).iter());
+                }
+            }
         }
         steps
     }
 
     /// Change of the outputs by signals that enter together, each between samples as `between` has it.
-    fn propagate(&self, column: usize, signals: &[Lanes], between: &[Lanes]) -> Vec<Vec<Lanes>> {
+    fn propagate(&self, entry: Entry, signals: &[Lanes], between: &[Lanes]) -> Vec<Vec<Lanes>> {
         let (n, l) = (self.states, self.outputs);
-        let of = &self.of_input[column];
+        let of = match entry {
+            Entry::Hook(column) => &self.of_input[column],
+            Entry::Sensor(output) => &self.of_sensor[output],
+        };
         let mut out = vec![vec![[0.0; TOGETHER]; signals.len()]; l];
         let (mut s, mut next) = (vec![[0.0; TOGETHER]; n], vec![[0.0; TOGETHER]; n]);
         for (k, (b, push)) in signals.iter().zip(between).enumerate() {
@@ -235,9 +256,9 @@ pub(in crate::explain::engine) fn path(
 }
 
 impl Path {
-    /// Changes of the outputs by signals that enter at a hook, at most [`TOGETHER`] of them, each with its values at the end of
+    /// Changes of the outputs by signals that enter at one place, at most [`TOGETHER`] of them, each with its values at the end of
     /// each sample; between, it is a straight line.
-    pub(crate) fn propagate(&self, column: usize, signals: &[(&Series, &Series)]) -> Vec<Series> {
+    pub(crate) fn propagate(&self, entry: Entry, signals: &[(&Series, &Series)]) -> Vec<Series> {
         let mut all = vec![Series::new(); signals.len()];
         for (r, steps) in self.0.iter().enumerate() {
             let samples = signals.first().map_or(0, |(signal, _)| signal[r].len());
@@ -249,7 +270,7 @@ impl Path {
                     between[k][w] = 0.5 * (b + end);
                 }
             }
-            for y in steps.propagate(column, &values, &between) {
+            for y in steps.propagate(entry, &values, &between) {
                 for (w, series) in all.iter_mut().enumerate() {
                     series.push(y.iter().map(|lanes| lanes[w]).collect());
                 }

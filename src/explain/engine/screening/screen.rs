@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::curve::{Curve, curves};
 use super::map::map;
-use super::path::{Hooked, Path, TOGETHER, hooked, path};
+use super::path::{Entry, Hooked, Path, TOGETHER, hooked, path};
 use super::projection::{Projection, SIGNATURE};
 use crate::explain::document::plots::spectrum;
 use crate::explain::engine::fitting::edit::{Place, enters_several, is_of, sensors};
@@ -15,7 +15,7 @@ use crate::explain::engine::terms::argument::{Argument, ArgumentForm, arguments}
 use crate::explain::engine::terms::library::TERMS;
 use crate::explain::engine::terms::names::{heats_itself, is_without_units, rank_of};
 use crate::explain::engine::terms::term::{Needs, Port, Starts, Term};
-use crate::explain::engine::terms::values::{Instance, evaluate_with_ends, grid};
+use crate::explain::engine::terms::values::{Instance, evaluate, evaluate_with_ends, grid};
 use crate::explain::engine::thresholds::significant;
 use crate::explain::explanation::EquationMap;
 use crate::noise::Series;
@@ -64,7 +64,20 @@ pub(crate) struct Lead {
     signature: [f64; SIGNATURE],
 }
 
+impl Screen {
+    /// Without leads, where nothing more is to be found.
+    pub(in crate::explain::engine) fn clear(&mut self) {
+        self.leads.clear();
+        self.curves.clear();
+    }
+}
+
 impl Lead {
+    /// Whether it is the same term of the same argument at the same place.
+    pub(in crate::explain::engine) fn is_alike(&self, other: &Self) -> bool {
+        (self.term, self.place, self.argument) == (other.term, other.place, other.argument)
+    }
+
     /// A term at a place that no test has looked at.
     pub(in crate::explain::engine) fn untested(term: &'static Term, place: Place) -> Self {
         Self {
@@ -185,7 +198,12 @@ pub(crate) fn screen(
             }
         }
     }
+    let shown = study.gain(along).map(|_| {
+        let each = arguments.iter().map(Argument::before_correction);
+        each.collect::<Vec<_>>()
+    });
     let tests = Tests {
+        shown: shown.as_deref().unwrap_or(&arguments),
         study,
         fit,
         recordings,
@@ -241,6 +259,8 @@ struct Tests<'a> {
     fit: &'a Fit,
     recordings: &'a [PlantRecording],
     arguments: &'a [Argument],
+    /// The same as sensors are expected to show them.
+    shown: &'a [Argument],
     hooked: &'a Hooked,
     path: &'a Path,
     projection: &'a Projection,
@@ -250,15 +270,19 @@ impl Tests<'_> {
     /// Tests terms at every place that takes them.
     fn of(&self, chunk: &[Instance]) -> Vec<Lead> {
         let hold = self.study.hold();
-        let values = evaluate_with_ends(chunk, self.arguments, self.recordings, hold);
-        let signals: Vec<(&Instance, [Series; 2])> = (chunk.iter())
+        let at_sensor = |i: &&Instance| i.term.port == Port::Sensor;
+        let of_sensors: Vec<Instance> = chunk.iter().filter(at_sensor).cloned().collect();
+        let others: Vec<Instance> = chunk.iter().filter(|i| !at_sensor(i)).cloned().collect();
+        let values = evaluate_with_ends(&others, self.arguments, self.recordings, hold);
+        let signals: Vec<(&Instance, [Series; 2])> = (others.iter())
             .zip(values.into_iter().flatten())
             .filter(|(_, both)| both.iter().flatten().flatten().all(|v| v.is_finite()))
             .collect();
         let mut leads = Vec::new();
-        for (instance, [signal, _]) in &signals {
-            if instance.term.port == Port::Sensor {
-                leads.extend(self.at_sensors(instance, signal));
+        let values = evaluate(&of_sensors, self.shown, self.recordings);
+        for (instance, signal) in of_sensors.iter().zip(values.into_iter().flatten()) {
+            if signal.iter().flatten().all(|v| v.is_finite()) {
+                leads.extend(self.at_sensors(instance, &signal));
             }
         }
         for (&place, &column) in self.hooked.places.iter().zip(&self.hooked.columns) {
@@ -269,7 +293,7 @@ impl Tests<'_> {
                 let entering: Vec<(&Series, &Series)> = (together.iter())
                     .map(|(_, [signal, ends])| (signal, ends))
                     .collect();
-                let propagated = self.path.propagate(column, &entering);
+                let propagated = self.path.propagate(Entry::Hook(column), &entering);
                 let each = together.iter().zip(&propagated);
                 leads
                     .extend(each.filter_map(|((i, _), series)| self.test(i, place, false, series)));
@@ -311,7 +335,6 @@ impl Tests<'_> {
         let spec = &self.study.plant().spec;
         let outputs = spec.outputs();
         let argument = self.argument(instance);
-        let l = outputs.len();
         let of = |at: usize| {
             let v = spec.equations[at].unknown.variable();
             let o = outputs.iter().position(|&y| y == v)?;
@@ -319,13 +342,10 @@ impl Tests<'_> {
             let own = argument.is_none_or(|a| {
                 a.variables == [v] || matches!(shown, Node::Variable(x) if a.variables == [x])
             });
-            let series: Series = (0..self.recordings.len() * l)
-                .map(|s| match s % l == o {
-                    true => signal[s / l].clone(),
-                    false => vec![0.0; signal[s / l].len()],
-                })
-                .collect();
-            let test = || self.test(instance, Place::Equation(at), true, &series);
+            let test = || {
+                let propagated = self.path.propagate(Entry::Sensor(o), &[(signal, signal)]);
+                self.test(instance, Place::Equation(at), true, propagated.first()?)
+            };
             own.then(test).flatten()
         };
         sensors(spec).into_iter().filter_map(of).collect()
@@ -493,11 +513,13 @@ fn peaks(study: &Study, fit: &Fit, recordings: &[PlantRecording]) -> Vec<f64> {
     found
 }
 
-/// Of the best leads that do the same to the recording, the most specific one; best first.
+/// Of the best leads that do the same to the recording, the most specific one, and of these the simplest; best first.
 fn distinct(leads: Vec<Lead>, spec: &ModelSpec, arguments: &[Argument]) -> Vec<Lead> {
     let rank = |l: &Lead| {
         let variables = l.argument.map_or(&[][..], |a| &arguments[a].variables);
-        (rank_of(spec, l.term, l.place, variables), variables.len())
+        let numbers = l.term.shapes.len() + l.term.memories.len();
+        let rank = rank_of(spec, l.term, l.place, variables);
+        (rank, variables.len(), numbers)
     };
     let mut kept: Vec<Lead> = Vec::new();
     for lead in leads {

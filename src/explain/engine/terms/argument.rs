@@ -4,6 +4,7 @@ use crate::physics::{
     Binary, Equation, ExpressionId, ModelSpec, Node, Unknown, VariableId, VariableKind,
 };
 
+use crate::explain::engine::fitting::edit::Place;
 use crate::explain::engine::terms::names::{
     is_position, is_velocity, may_be_angle, may_be_velocity,
 };
@@ -20,6 +21,8 @@ pub(crate) enum ArgumentForm {
     Product,
     /// The difference of the fourth powers of two absolute temperatures in 100 K.
     Radiation,
+    /// The size of what drives a velocity, with the sign of this: a loss in proportion to the force.
+    Driven,
 }
 
 /// An expression of the plant's variables.
@@ -99,6 +102,19 @@ impl Argument {
         self.sorted = all.into_iter().step_by(every).collect();
         self.sorted.sort_by(f64::total_cmp);
         self.values = values;
+    }
+
+    /// The same with the values before an observer corrects them: what a sensor is expected to show.
+    pub(crate) fn before_correction(&self) -> Self {
+        let before = |(values, ends): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+            let first = values.first().copied();
+            let others = ends.iter().copied().take(values.len().saturating_sub(1));
+            first.into_iter().chain(others).collect()
+        };
+        let values = self.values.iter().zip(&self.ends).map(before).collect();
+        let mut before = self.clone();
+        before.set(values, self.ends.clone());
+        before
     }
 
     /// The value below which this part of all values lies.
@@ -184,6 +200,7 @@ impl Argument {
         if self.form == ArgumentForm::Product
             || self.form == ArgumentForm::Radiation && needs != Needs::Radiation
             || self.form == ArgumentForm::FromReference && needs != Needs::Difference
+            || self.form == ArgumentForm::Driven && needs != Needs::Driven
         {
             return false;
         }
@@ -193,12 +210,14 @@ impl Argument {
             Needs::BothSigns => both,
             Needs::Positive => self.quantile(0.0) >= 0.0,
             Needs::Radiation => self.form == ArgumentForm::Radiation,
+            Needs::Driven => self.form == ArgumentForm::Driven && both,
             Needs::Difference => {
                 let of_text = [ArgumentForm::Difference, ArgumentForm::FromReference];
                 of_text.contains(&self.form) || self.is_difference
             }
             Needs::Stretch => self.position && self.serves(Needs::Difference),
             Needs::Angle => self.angle,
+            Needs::AlongPath => self.angle || self.position && self.variables.len() == 1,
             Needs::Velocity => both && self.velocity,
             Needs::Directed => {
                 let turns = self.quantile(0.0) < 0.0 && self.quantile(1.0) > 0.0;
@@ -270,6 +289,34 @@ fn difference_of(spec: &ModelSpec, a: VariableId, b: VariableId) -> Option<Varia
     let equation = spec.equations.iter().find(is)?;
     let variable = equation.unknown.variable();
     (spec.variable(variable).kind == VariableKind::Algebraic).then_some(variable)
+}
+
+/// Sizes of inputs and states that drive a velocity, with its sign.
+fn driven(spec: &ModelSpec, variables: &[VariableId]) -> Vec<Argument> {
+    let velocity = |v: VariableId| {
+        let state = spec.variable(v).kind == VariableKind::State;
+        state && (is_velocity(spec, &[v]) || may_be_velocity(spec, &[v]))
+    };
+    let equation = |v: VariableId| {
+        let of = |e: &Equation| e.unknown == Unknown::Derivative(v);
+        spec.equations.iter().position(of)
+    };
+    let mut found = Vec::new();
+    for &v in variables.iter().filter(|&&v| velocity(v)) {
+        let Some(at) = equation(v) else { continue };
+        let drives = |&&u: &&VariableId| {
+            let source = spec.variable(u).kind != VariableKind::Algebraic;
+            u != v && source && Place::Equation(at).uses(spec, u)
+        };
+        found.extend(variables.iter().filter(drives).map(|&u| {
+            let name = |v: VariableId| &spec.variable(v).name;
+            let text = format!("abs({})*sign({})", name(u), name(v));
+            let mut argument = Argument::new(spec, text, vec![u, v]);
+            (argument.form, argument.rate) = (ArgumentForm::Driven, None);
+            argument
+        }));
+    }
+    found
 }
 
 /// Differences of variables and numbers or parameters that stand in the text, such as of a temperature and that of a room.
@@ -380,6 +427,7 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
             }
         }
     }
+    found.extend(driven(spec, &simple));
     found.extend(from_references(spec, &simple));
     // Bodies radiate to each other, and each to a room.
     let fourth = |v: VariableId| match spec.variable(v).unit_text.as_deref() {

@@ -5,14 +5,16 @@ use super::term::{
 };
 pub(super) const ABOVE: &[f64] = &[0.5, 0.7, 0.85, 0.94, 0.98];
 pub(super) const BELOW: &[f64] = &[0.5, 0.3, 0.15, 0.06, 0.02];
+/// When something changes.
+pub(super) const STEP: Shape = shape("t0", Starts::Instants(TIMES), false);
 pub(super) const TIMES: &[f64] = &[
     0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85,
     0.9, 0.95,
 ];
 
 use Needs::{
-    Angle, Anything, BothSigns, Difference, Directed, OneWay, OwnState, Positive, Radiation,
-    Stretch, Time, Velocity,
+    AlongPath, Angle, Anything, BothSigns, Difference, Directed, Driven, OneWay, OwnState,
+    Positive, Radiation, Stretch, Time, Velocity,
 };
 use Port::{Equation, Input, Parameter, Sensor};
 
@@ -245,7 +247,7 @@ pub(crate) const TERMS: &[Term] = &[
             false,
         )],
     ),
-    curve("sine", Equation, Angle, "sin({k}*{z} + {p})", WAVE),
+    curve("sine", Equation, AlongPath, "sin({k}*{z} + {p})", WAVE),
     curve("gravity", Equation, Angle, "sin({z})", &[]),
     curve(
         "gravity",
@@ -266,6 +268,7 @@ pub(crate) const TERMS: &[Term] = &[
         "{z}*abs({z})^0.25",
         &[],
     ),
+    curve("efficiency", Equation, Driven, "{z}", &[]),
     curve("load_constant", Equation, Time, "1.0", &[]),
     curve("load_ramp", Equation, Time, "time", &[]),
     curve(
@@ -273,7 +276,7 @@ pub(crate) const TERMS: &[Term] = &[
         Equation,
         Time,
         "(if time > {t0} then 1.0 else 0.0)",
-        &[shape("t0", Starts::Instants(TIMES), false)],
+        &[STEP],
     ),
     curve(
         "periodic",
@@ -290,18 +293,12 @@ pub(crate) const TERMS: &[Term] = &[
         ],
     ),
     // About a usual value: the parameter itself stays what it is there, and within its bounds.
-    curve(
-        "parameter_curve",
-        Parameter,
-        Anything,
-        "({z} - {usual})",
-        &[],
-    ),
+    curve("parameter_curve", Parameter, Anything, "({z}{-usual})", &[]),
     curve(
         "parameter_square",
         Parameter,
         Anything,
-        "({z}^2 - {usual}*{usual})",
+        "({z}^2{-usual^2})",
         &[],
     ),
     // Gains that go round with an angle: eccentric magnets, gears, cranks.
@@ -317,7 +314,7 @@ pub(crate) const TERMS: &[Term] = &[
         Parameter,
         Time,
         "(if time > {t0} then 1.0 else 0.0)",
-        &[shape("t0", Starts::Instants(TIMES), false)],
+        &[STEP],
     ),
     curve("parameter_ramp", Parameter, Time, "time", &[]),
     Term {
@@ -379,7 +376,8 @@ pub(crate) const TERMS: &[Term] = &[
         symbol: "",
         units: &[],
     },
-    curve("input_asymmetry", Input, BothSigns, "max({z}, 0)", &[]),
+    curve("input_asymmetry", Input, Directed, "max({z}, 0)", &[]),
+    curve("input_asymmetry", Input, Directed, "min({z}, 0)", &[]),
     curve("input_square", Input, Anything, "{z}^2", &[]),
     curve("input_cube", Input, Anything, "{z}^3", &[]),
     Term {
@@ -464,6 +462,14 @@ pub(crate) const TERMS: &[Term] = &[
     curve("sensor_offset", Sensor, Time, "1.0", &[]),
     curve("sensor_drift", Sensor, Time, "time", &[]),
     curve("sensor_scale", Sensor, Anything, "{z}", &[]),
+    // With a zero that is wrong too.
+    curve(
+        "sensor_scale",
+        Sensor,
+        Anything,
+        "{z} - {from}",
+        &[shape("from", Starts::Quantiles(&[0.1, 0.5, 0.9]), false)],
+    ),
     Term {
         id: "sensor_lag",
         port: Sensor,

@@ -121,7 +121,9 @@ fn unused(spec: &ModelSpec, v: VariableId) -> bool {
 fn term_in_range(found: &Fitted) -> &'static Term {
     let (from, to) = found.range;
     let id = match (found.lead.term.id, found.shapes.first()) {
-        ("load_step", Some(&at)) if is_early(at, found.range) => "load_constant",
+        ("load_step", Some(&at)) if found.shapes.len() == 1 && is_early(at, found.range) => {
+            "load_constant"
+        }
         ("above", Some(&edge)) if edge <= from + NARROW * (to - from) => "linear",
         ("both_sides", Some(&edge)) if edge < NARROW * from.abs().max(to.abs()) => "linear",
         ("root_above", Some(&edge)) if edge < 0.5 * (from + to) => "root",
@@ -211,7 +213,7 @@ fn unit_of(spec: &ModelSpec, v: VariableId) -> &str {
 /// Effects that are forms of one: what a second of them finds is what the first left.
 pub(crate) fn family(id: &str) -> &str {
     match id {
-        "stribeck_friction" | "hysteresis" => "coulomb_friction",
+        "stribeck_friction" | "hysteresis" | "efficiency" => "coulomb_friction",
         "cubic_drag" | "asymmetric_damping" => "quadratic_drag",
         "quadratic_stiffness" | "end_stop" => "cubic_stiffness",
         "backlash" => "extra_mode",
@@ -227,6 +229,7 @@ pub(crate) fn family(id: &str) -> &str {
 pub(in crate::explain::engine) fn special_case(id: &str) -> Option<&'static str> {
     match id {
         "stribeck_friction" => Some("coulomb_friction"),
+        "asymmetric_damping" => Some("viscous_friction"),
         "hysteresis" => Some("input_backlash"),
         _ => None,
     }
@@ -288,7 +291,7 @@ pub(crate) fn called(
         (Port::Equation, "one_way_friction") if *variables == [own] => "coulomb_friction",
         (Port::Equation, "stribeck" | "stribeck_bristles") => "stribeck_friction",
         (Port::Equation, "bristles") => "hysteresis",
-        (Port::Equation, id @ ("extra_mode" | "backlash")) => id,
+        (Port::Equation, id @ ("extra_mode" | "backlash" | "efficiency")) => id,
         (Port::Equation, "gap") if what == Kind::Position => "backlash",
         (Port::Equation, "one_sided") if what == Kind::Velocity => "asymmetric_damping",
         (Port::Equation, "above" | "below" | "both_sides") => match what {
@@ -411,8 +414,11 @@ pub(in crate::explain::engine) fn rank_of(
     let (of_place, elsewhere) = match place {
         Place::Equation(at) => {
             let own = place.variable(spec);
-            let from_outside =
-                term.needs == Needs::Time || variables.iter().any(|&v| unused(spec, v));
+            let moves = |v: VariableId| is_velocity(spec, &[v]) || is_position(spec, &[v]);
+            // Time, an input that nothing else uses, or where something is and how fast.
+            let is_force = term.needs == Needs::Time
+                || variables.iter().any(|&v| unused(spec, v))
+                || !variables.is_empty() && variables.iter().all(|&v| moves(v));
             let elsewhere = match spec.equations[at].unknown {
                 // What a sensor does at its own time comes last; and where nothing drives the plant it lags only by where it was at
                 // the start, which a second store does too.
@@ -424,8 +430,8 @@ pub(in crate::explain::engine) fn rank_of(
                     1
                 }
                 _ if variables.contains(&own) || term.port != Port::Equation => 0,
-                // A load, and an input that nothing else uses, act on what moves, before what drives it.
-                Unknown::Derivative(v) if from_outside && !is_velocity(spec, &[v]) => 2,
+                // A load and a force act on what moves, before what drives it.
+                Unknown::Derivative(v) if is_force && !is_velocity(spec, &[v]) => 2,
                 Unknown::Derivative(_) => 1,
                 Unknown::Value(_) if spec.variable(own).output => 2,
                 Unknown::Value(_) => 3,

@@ -1,23 +1,26 @@
 //! Forms of terms with one shape more, where their physics has one.
 
 use super::library::{
-    ABOVE, BACKLASH, BELOW, DEAD_ZONE, HYSTERESIS, LIMIT, STICTION, STOP, UPPER_LIMIT, hysteresis,
+    ABOVE, BACKLASH, BELOW, DEAD_ZONE, HYSTERESIS, LIMIT, STEP, STICTION, STOP, UPPER_LIMIT,
+    hysteresis,
 };
 use super::term::Needs::{self, Anything, BothSigns, Time};
-use super::term::Port::{Equation, Input, Parameter, Sensor};
+use super::term::Port::{self, Equation, Input, Parameter, Sensor};
 use super::term::{Memory, MemoryStart, Shape, Starts, Term, curve, in_place, sampled, shape};
 
 /// The forms of a term with one shape more: a contact has damping in proportion to its depth (K. H. Hunt and F. R. E. Crossley,
 /// *J. Appl. Mech.* 42, 1975), a flow over a crest a power of its height (3/2 over a weir), and an actuator with play, stiction or
-/// hysteresis a lag; the two sides of limits and dead zones differ, and a ramp begins later than the recording. They keep the name.
+/// hysteresis a lag; the two sides of limits and dead zones differ, a ramp begins later than the recording, and a change takes time. They keep the name.
 pub(in crate::explain::engine) fn richer(term: &Term) -> &'static [Term] {
     match (term.id, term.shapes) {
         ("above", _) => ABOVE_MORE,
         ("below", _) => BELOW_MORE,
         ("both_sides", _) => BOTH_SIDES_MORE,
-        ("load_ramp", _) => LOAD_LATER,
-        ("parameter_ramp", _) => PARAMETER_LATER,
-        ("sensor_drift", _) => DRIFT_LATER,
+        ("load_ramp", _) => LOAD_RAMPS,
+        ("load_step", _) => LOAD_COURSES,
+        ("parameter_ramp", _) => PARAMETER_RAMPS,
+        ("parameter_step", _) => PARAMETER_COURSES,
+        ("sensor_drift", _) => DRIFTS,
         ("input_dead_zone", _) => DEAD_ZONE_OF_TWO,
         ("input_saturation", [LIMIT]) => LIMITS_OF_TWO,
         ("input_saturation", [UPPER_LIMIT]) => UPPER_AND_LOWER,
@@ -42,7 +45,8 @@ const OTHER: Shape = shape(
 );
 /// When a ramp begins.
 const BEGIN: Shape = shape("t0", Starts::Instants(&[0.1, 0.3, 0.5, 0.7]), false);
-const LATER: &str = "max(time - {t0}, 0)";
+/// How long a change takes.
+const DURATION: Shape = shape("T", Starts::Length(&[0.02, 0.1, 0.3]), true);
 
 const ABOVE_MORE: &[Term] = &[
     curve(
@@ -83,9 +87,32 @@ const BOTH_SIDES_MORE: &[Term] = &[
         &[shape("from", Starts::SizeQuantiles(ABOVE), true), OTHER],
     ),
 ];
-const LOAD_LATER: &[Term] = &[curve("load_ramp", Equation, Time, LATER, &[BEGIN])];
-const PARAMETER_LATER: &[Term] = &[curve("parameter_ramp", Parameter, Time, LATER, &[BEGIN])];
-const DRIFT_LATER: &[Term] = &[curve("sensor_drift", Sensor, Time, LATER, &[BEGIN])];
+/// A change that ends, as an exponential function, along a sigmoid and along a straight line.
+const COURSES: [&str; 3] = [
+    "1.0 - exp(-max(time - {t0}, 0)/{T})",
+    "0.5 + 0.5*tanh((time - {t0})/{T})",
+    "min(max(time - {t0}, 0)/{T}, 1.0)",
+];
+const fn courses(id: &'static str, port: Port) -> [Term; 3] {
+    let [exponential, sigmoid, line] = COURSES;
+    [
+        curve(id, port, Time, exponential, &[STEP, DURATION]),
+        curve(id, port, Time, sigmoid, &[STEP, DURATION]),
+        curve(id, port, Time, line, &[STEP, DURATION]),
+    ]
+}
+/// A ramp that begins later, and one that flattens.
+const fn ramps(id: &'static str, port: Port) -> [Term; 2] {
+    [
+        curve(id, port, Time, "max(time - {t0}, 0)", &[BEGIN]),
+        curve(id, port, Time, "1.0 - exp(-time/{T})", &[DURATION]),
+    ]
+}
+const LOAD_COURSES: &[Term] = &courses("load_step", Equation);
+const PARAMETER_COURSES: &[Term] = &courses("parameter_step", Parameter);
+const LOAD_RAMPS: &[Term] = &ramps("load_ramp", Equation);
+const PARAMETER_RAMPS: &[Term] = &ramps("parameter_ramp", Parameter);
+const DRIFTS: &[Term] = &ramps("sensor_drift", Sensor);
 
 const fn limits(
     id: &'static str,
@@ -192,6 +219,6 @@ mod tests {
             assert_eq!(of(richer), of(simple));
             count += 1;
         }
-        assert_eq!(count, 15);
+        assert_eq!(count, 24);
     }
 }

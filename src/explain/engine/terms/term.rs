@@ -26,10 +26,14 @@ pub(crate) enum Needs {
     Radiation,
     /// A difference of two variables of one unit.
     Difference,
+    /// The size of what drives a velocity, with the sign of this.
+    Driven,
     /// Such a difference of positions: what a spring is stretched by.
     Stretch,
     /// An angle.
     Angle,
+    /// An angle, or the position of what moves along a line.
+    AlongPath,
     /// A velocity of both signs.
     Velocity,
     /// A velocity of one sign.
@@ -116,6 +120,11 @@ impl Shape {
     pub(crate) fn is_instant(&self) -> bool {
         matches!(self.starts, Starts::Instants(_))
     }
+
+    /// Whether it is a time that something takes.
+    pub(crate) fn is_duration(&self) -> bool {
+        matches!(self.starts, Starts::Samples(_) | Starts::Length(_))
+    }
 }
 
 /// A term.
@@ -126,7 +135,7 @@ pub(crate) struct Term {
     pub(crate) port: Port,
     pub(crate) needs: Needs,
     /// Function of `{z}`, of the shapes, and of the memories; the strength is its factor. `{v}` is what stands at the place,
-    /// `{a}` the factor of the derivative there, `{usual}` a usual value of `{z}`.
+    /// `{a}` the factor of the derivative there, `{-usual}` ` - ` and a usual value of `{z}`, `{-usual^2}` its square.
     pub(crate) form: &'static str,
     pub(crate) memories: &'static [Memory],
     pub(crate) shapes: &'static [Shape],

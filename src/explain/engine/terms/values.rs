@@ -14,6 +14,8 @@ const IN_A_TURN: [f64; 22] = [
     1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 15.0, 16.0, 18.0, 20.0, 21.0,
     24.0, 28.0, 30.0, 36.0, 48.0,
 ];
+/// Most periods of what is periodic along a line that are looked for.
+const PERIODS: u32 = 24;
 /// A memory that follows at once does so in a sample divided by this.
 const FAST: f64 = 5.0;
 
@@ -56,16 +58,21 @@ pub(in crate::explain::engine) fn starts(
     }
 }
 
-/// Wave numbers with so many periods in the range of an angle, and beyond these whole ones, as far as samples resolve them.
-fn waves(counts: &[f64], angle: &Argument, sample_time: f64) -> Vec<f64> {
+/// Wave numbers with so many periods in the range of an angle, and beyond these whole ones; of a position, which no whole number of
+/// periods goes around, every half period more. As far as samples resolve them.
+fn waves(counts: &[f64], along: &Argument, sample_time: f64) -> Vec<f64> {
     const TURN: f64 = 2.0 * std::f64::consts::PI;
-    let in_range = counts.iter().map(|n| TURN * n / angle.range());
+    let in_range = counts.iter().map(|n| TURN * n / along.range());
     let most = in_range.clone().fold(0.0, f64::max);
-    let resolved = 0.5 * TURN / (sample_time * angle.rate_size(sample_time));
-    let whole = IN_A_TURN.iter().copied();
-    in_range
-        .chain(whole.filter(|k| (most..resolved).contains(k)))
-        .collect()
+    let resolved = 0.5 * TURN / (sample_time * along.rate_size(sample_time));
+    let more: Vec<f64> = match along.angle {
+        true => IN_A_TURN.into_iter().filter(|k| *k >= most).collect(),
+        false => (2..=2 * PERIODS)
+            .map(|n| 0.5 * f64::from(n) * TURN / along.range())
+            .collect(),
+    };
+    let more = more.into_iter().filter(|k| *k < resolved);
+    in_range.filter(|_| along.angle).chain(more).collect()
 }
 
 /// Mean time between values of the first output: the sample time, unless some are missing.
@@ -129,7 +136,22 @@ pub(crate) fn filled(
     text
 }
 
+/// The form with the usual value of its argument in it, where that is not zero.
+pub(crate) fn about_usual(form: &str, usual: f64) -> String {
+    let value = match usual {
+        _ if usual < 0.0 => format!("({usual})"),
+        _ => usual.to_string(),
+    };
+    let [once, twice] = match usual {
+        0.0 => [String::new(), String::new()],
+        _ => [format!(" - {value}"), format!(" - {value}*{value}")],
+    };
+    form.replace("{-usual}", &once)
+        .replace("{-usual^2}", &twice)
+}
+
 /// A term at an argument with shapes, whose values are asked for.
+#[derive(Debug, Clone)]
 pub(in crate::explain::engine) struct Instance {
     pub(in crate::explain::engine) term: &'static Term,
     pub(in crate::explain::engine) argument: Option<usize>,
@@ -188,10 +210,10 @@ fn values_and_ends(
             // What stands at the place is what parameters scale, and a size of the term does not matter here.
             let fill = |argument: &str| {
                 let form = instance.term.form;
-                filled(form, instance.term, argument, &memories, &shapes, h)
+                let text = filled(form, instance.term, argument, &memories, &shapes, h)
                     .replace("{v}", "0.0")
-                    .replace("{usual}", "0.0")
-                    .replace("{a}", "1.0")
+                    .replace("{a}", "1.0");
+                about_usual(&text, 0.0)
             };
             text.push_str(&format!("output Real b{i};\n"));
             equations.push_str(&format!("b{i} = {};\n", fill(&argument)));

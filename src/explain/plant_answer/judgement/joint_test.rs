@@ -6,7 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::explain::explanation::JointTest;
 
 /// Level of the test: that of 3.3 standard deviations of one parameter.
-const LEVEL: f64 = 1e-3;
+pub(in crate::explain::plant_answer) const LEVEL: f64 = 1e-3;
 /// Eigenvalues of a matrix of correlations below this are rounding of its inversion.
 const ROUNDING: f64 = 1e-10;
 

@@ -137,6 +137,23 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
         ],
     ),
     effect(
+        "efficiency",
+        "loss in proportion to what drives, such as in a worm gear",
+        "J*der(w) = ... + c*abs(M)*sign(w)",
+        ANY_EQUATION,
+        "what drives a velocity, and the velocity",
+        &[
+            like(
+                "coulomb_friction",
+                "Turn it at one speed under several loads: dry friction is the same, a loss grows with the load.",
+            ),
+            like(
+                "input_asymmetry",
+                "Let the load drive it in both directions: an asymmetric input depends on its own sign only.",
+            ),
+        ],
+    ),
+    effect(
         "viscous_friction",
         "force against the speed, in proportion to it",
         "J*der(w) = ... + c*w",

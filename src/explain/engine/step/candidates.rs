@@ -1,0 +1,230 @@
+//! Fits of promising terms: all at a glance, the best of them as far as they go.
+
+use rayon::prelude::*;
+
+use super::Stage;
+use super::origins::{Origin, Origins};
+use super::promising::{is_specific, promising};
+use crate::explain::engine::fitting::candidate::{Candidate, candidate};
+use crate::explain::engine::fitting::fitted::{Fitted, TIE, forms, searched, with_more};
+use crate::explain::engine::fitting::release::released;
+use crate::explain::engine::screening::screen::Lead;
+use crate::explain::engine::terms::names::named;
+use crate::explain::engine::thresholds::{
+    COMPARED, FITTED, FOLLOWS, GLANCE, GLANCED_STEPS, MOST_STEPS, THOROUGH, times_more,
+};
+use crate::physics::ModelSpec;
+use crate::physics::estimate::{Fit, Form, Study};
+
+/// Terms with a name that are fitted at the place of a best that has none, and of one form.
+const NAMED_THERE: usize = 6;
+const NAMED_OF_A_FORM: usize = 2;
+
+/// A lead that was fitted with the noise of the fit before, and what that gains.
+#[derive(Clone)]
+struct Glanced {
+    gain: f64,
+    lead: Lead,
+    origin: usize,
+    candidate: Candidate,
+    fit: Fit,
+}
+
+/// The fits of one step.
+pub(super) struct Candidates<'a> {
+    pub(super) stage: &'a Stage<'a>,
+    pub(super) origins: &'a Origins,
+}
+
+impl Candidates<'_> {
+    /// Candidates that were fitted, not yet until nothing changes.
+    pub(super) fn fitted(&self) -> Vec<Fitted> {
+        let chosen = self.chosen();
+        let mut fitted: Vec<Fitted> = chosen.into_par_iter().filter_map(|g| self.fit(g)).collect();
+        fitted.extend(self.named_at_the_best(&fitted));
+        fitted
+    }
+
+    /// How many times more is tried.
+    fn more(&self) -> usize {
+        let study = self.stage.study;
+        times_more(study.count().max(study.samples()))
+    }
+
+    /// The best at a glance of each screen, and those close to it that have a name of their own.
+    fn chosen(&self) -> Vec<Glanced> {
+        let (spec, more) = (&self.stage.plant.spec, self.more());
+        let leads = (self.origins.all.iter().enumerate()).flat_map(|(i, origin)| {
+            let each = promising(&origin.screen, spec, more).into_iter();
+            each.map(move |lead| (i, lead))
+        });
+        let leads: Vec<(usize, Lead)> = leads.collect();
+        let glanced = leads.into_par_iter().filter_map(|(i, l)| self.glance(i, l));
+        let mut glanced: Vec<Glanced> = glanced.collect();
+        glanced.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let mut chosen = Vec::new();
+        for (i, origin) in self.origins.all.iter().enumerate() {
+            let mut of_origin = glanced.iter().filter(|g| g.origin == i);
+            let best: Vec<&Glanced> = of_origin.by_ref().take(more * FITTED).collect();
+            let most = best.first().map_or(0.0, |g| g.gain);
+            let close = |g: &&Glanced| {
+                g.gain > (1.0 - TIE.1) * most && is_specific(&g.lead, &origin.screen, spec)
+            };
+            chosen.extend(best.into_iter().cloned());
+            chosen.extend(of_origin.filter(close).cloned());
+        }
+        chosen
+    }
+
+    /// A fit with the noise of the fit before.
+    fn glance(&self, at: usize, lead: Lead) -> Option<Glanced> {
+        let Stage {
+            plant,
+            study,
+            recordings,
+            ..
+        } = *self.stage;
+        let Origin { screen, fit: from } = &self.origins.all[at];
+        let parameters = study.parameters();
+        let made = candidate(&plant.spec, &lead, &screen.arguments, recordings)?;
+        let options = with_more(self.stage.options, made.values.len());
+        let rough = made.rough(study, GLANCED_STEPS);
+        let inner = study.of(&rough, &options).ok()?;
+        let start = match screen.strays {
+            true => started(&inner, &made, &lead, (study, from)),
+            false => made.from(from, parameters),
+        };
+        // What a memory does within a sample, such as a contact, frozen slopes do not see.
+        let glance = |start: &Fit| match made.new_states {
+            0 => inner.glance(start, GLANCE),
+            _ => inner.refit(start, 0, GLANCE),
+        };
+        let text = self.stage.of_text(from).filter(|_| self.more() > 1);
+        let otherwise =
+            text.or_else(|| study.off_bounds(from, self.stage.given.parameters().len()));
+        let otherwise = otherwise.and_then(|text| glance(&made.from(&text, parameters)));
+        let fitted = (glance(&start).into_iter().chain(otherwise))
+            .min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
+        let again = |fit: &Fit| inner.refit(fit, 0, GLANCE);
+        let fit = released(&inner, lead.term, parameters, fitted, &again);
+        Some(Glanced {
+            gain: from.deviance - fit.deviance,
+            lead,
+            origin: at,
+            candidate: made,
+            fit,
+        })
+    }
+
+    /// A fit with a noise model of its own.
+    fn fit(&self, glanced: Glanced) -> Option<Fitted> {
+        let Stage {
+            plant,
+            study,
+            fit: before,
+            recordings,
+            ..
+        } = *self.stage;
+        let Glanced {
+            lead,
+            candidate: made,
+            fit: from,
+            ..
+        } = glanced;
+        let arguments = &self.origins.all[glanced.origin].screen.arguments;
+        let options = with_more(self.stage.options, made.values.len());
+        let rough = made.rough(study, MOST_STEPS);
+        let inner = study.of(&rough, &options).ok()?;
+        let starts = forms(from, before, study.gains());
+        let best = starts
+            .iter()
+            .filter_map(|start| match made.new_states {
+                0 => inner.compare(start, COMPARED),
+                _ => inner.refit(start, 1, THOROUGH),
+            })
+            .filter(|fit| {
+                fit.form == Form::Innovation
+                    || inner.follows(fit) && still_shows((&inner, fit), &lead, &plant.spec)
+            })
+            .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
+        let gain = before.criterion - best.criterion - searched(&lead, recordings);
+        let argument = lead.argument.map(|a| &arguments[a]);
+        let fitted = Fitted {
+            depends: vec![],
+            argument: String::new(),
+            range: (0.0, 0.0),
+            travel: 0.0,
+            usual: 0.0,
+            comes_back: true,
+            shapes: best.point[study.parameters()..][..lead.shapes.len()].to_vec(),
+            lead,
+            candidate: made,
+            fit: best,
+            gain,
+            hypothesis: None,
+            explains: false,
+            proved: false,
+            likelier: false,
+        };
+        Some(fitted.depending_on(argument, &plant.spec, recordings))
+    }
+
+    /// Where the best has no name, terms that have one at its place, whatever a glance said of them.
+    fn named_at_the_best(&self, fitted: &[Fitted]) -> Vec<Fitted> {
+        let spec = &self.stage.plant.spec;
+        let best = fitted.iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
+        let unnamed = |f: &&Fitted| f.gain > self.stage.needed && named(spec, f) == "law";
+        let Some(best) = best.filter(unnamed) else {
+            return vec![];
+        };
+        let mut more: Vec<(usize, Lead)> = Vec::new();
+        for (i, origin) in self.origins.all.iter().enumerate() {
+            let leads = &origin.screen.leads;
+            for lead in leads.iter().filter(|l| l.place == best.lead.place) {
+                let known = fitted.iter().any(|f| f.lead.is_alike(lead))
+                    || more.iter().any(|(_, l)| l.is_alike(lead));
+                let of_form = more.iter().filter(|(_, l)| l.term == lead.term).count();
+                if !known
+                    && is_specific(lead, &origin.screen, spec)
+                    && of_form < NAMED_OF_A_FORM
+                    && more.len() < NAMED_THERE
+                {
+                    more.push((i, lead.clone()));
+                }
+            }
+        }
+        let glanced = more.into_par_iter().filter_map(|(i, l)| self.glance(i, l));
+        glanced.filter_map(|g| self.fit(g)).collect()
+    }
+}
+
+/// Where the fit of a candidate starts: with the other numbers as they were, or as the regression on its term moves them.
+fn started(inner: &Study, made: &Candidate, lead: &Lead, (study, from): (&Study, &Fit)) -> Fit {
+    let parameters = study.parameters();
+    let plain = made.from(from, parameters);
+    if lead.shift.is_empty() {
+        return plain;
+    }
+    let moved = Fit {
+        point: study.moved(from, &lead.shift),
+        ..from.clone()
+    };
+    let moved = made.from(&moved, parameters);
+    let deviance = |fit: &Fit| inner.deviance(fit).unwrap_or(f64::INFINITY);
+    if deviance(&moved) < deviance(&plain) {
+        moved
+    } else {
+        plain
+    }
+}
+
+/// Whether a sensor shows more than a constant with the term in it.
+fn still_shows((study, fit): (&Study, &Fit), lead: &Lead, spec: &ModelSpec) -> bool {
+    if !lead.sensor {
+        return true;
+    }
+    let variable = lead.place.variable(spec);
+    let output = spec.outputs().into_iter().position(|y| y == variable);
+    let left = output.and_then(|o| study.left(fit)?.get(o).copied());
+    left.is_none_or(|left| left < FOLLOWS * FOLLOWS)
+}
