@@ -13,6 +13,7 @@ mod physics_simulate;
 mod physics_texts;
 mod plant_cli;
 mod plant_coast_down;
+mod plant_confounded;
 mod plant_explain;
 mod plant_feedback;
 mod plant_few_samples;

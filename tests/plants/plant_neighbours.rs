@@ -9,7 +9,7 @@ use crate::folder::{Folder, effects};
 use crate::plant_initial_states::noise;
 
 /// Rows of a log: the inputs held over each interval, and what the states show, with noise.
-fn recorded(
+pub fn recorded(
     names: &str,
     (count, step): (usize, f64),
     inputs: &[&dyn Fn(usize) -> f64],
@@ -42,20 +42,20 @@ fn recorded(
 }
 
 /// Levels that change every so many samples, without a pattern.
-fn levels(every: usize, low: f64, high: f64) -> impl Fn(usize) -> f64 {
+pub fn levels(every: usize, low: f64, high: f64) -> impl Fn(usize) -> f64 {
     move |k| {
         let part = ((k / every) as f64 * 0.618_033_988_7 + 0.13).fract();
         low + (high - low) * part
     }
 }
 
-fn explained(folder: &Folder, log: &str, model: &str) -> Value {
+pub fn explained(folder: &Folder, log: &str, model: &str) -> Value {
     folder.text("log.csv", log);
     folder.text("plant.mo", model);
     folder.explained("log.csv", "plant.mo", &[])
 }
 
-fn number(said: &Value, effect: usize, name: &str) -> f64 {
+pub fn number(said: &Value, effect: usize, name: &str) -> f64 {
     let found = &said["effects"][effect]["parameters"][name]["value"];
     found.as_f64().unwrap_or_else(|| panic!("{name}: {said:#}"))
 }
