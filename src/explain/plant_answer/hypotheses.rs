@@ -291,7 +291,7 @@ fn verdict(
             HypothesisVerdict::Supported
         }
     } else if own.gain < NEEDED {
-        if at_bounds.is_empty() {
+        if at_bounds.is_empty() || own.gain > 0.0 {
             HypothesisVerdict::NotSupported
         } else {
             HypothesisVerdict::Refused

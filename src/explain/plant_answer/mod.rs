@@ -274,7 +274,7 @@ impl Answer<'_> {
         } else {
             Verdict::Consistent
         };
-        let probability = probability(verdict, effects.len(), p_value);
+        let probability = probability(verdict, effects.len(), p_value, self.found.values);
         let mut summary = self.summary(&Told {
             verdict,
             probability,
@@ -293,7 +293,9 @@ impl Answer<'_> {
         // say nothing of what a load or a parameter does later.
         let in_time = |f: &Fitted| f.lead.term.needs == Needs::Time && f.lead.term.id != "periodic";
         let later = self.effects().any(in_time);
-        let relied_on = verdict != Verdict::Unexplained || effects.is_empty() || better && !later;
+        let doubted = self.effects().any(|fitted| self.doubt(fitted).is_some());
+        let relied_on =
+            verdict != Verdict::Unexplained || effects.is_empty() || better && !later && !doubted;
         if !relied_on {
             summary.push(
                 "It is not sure enough to predict with: `simulate` uses the equations without it."
