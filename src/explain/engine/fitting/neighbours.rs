@@ -98,9 +98,9 @@ pub(in crate::explain::engine) fn as_parameter_changes(
     ground: &Ground,
 ) -> Vec<Fitted> {
     let ids: &[&str] = match fitted.lead.term.id {
-        "load_step" => &["parameter_step"],
-        "load_ramp" => &["parameter_ramp"],
-        "parameter_step" | "parameter_ramp" => &["parameter_step", "parameter_ramp"],
+        "load_step" | "load_ramp" | "parameter_step" | "parameter_ramp" => {
+            &["parameter_step", "parameter_ramp"]
+        }
         _ => return vec![],
     };
     let terms = TERMS.iter().filter(|term| ids.contains(&term.id));

@@ -71,6 +71,12 @@ pub(super) fn add_neighbours(
     };
     let mut more = as_parameter_changes(one, stage.given, arguments, ground);
     more.extend(as_plain_functions(one, arguments, ground));
+    let best_of_more = more.iter_mut().max_by(|a, b| a.gain.total_cmp(&b.gain));
+    if let Some(better) = best_of_more.filter(|f| f.gain > one.gain)
+        && let Some(richer) = richer_form(better, arguments, ground)
+    {
+        *better = richer;
+    }
     more.retain(|f| stage.scope.allows(named(&stage.plant.spec, f)));
     fitted.extend(more);
     drop_repeated(fitted)

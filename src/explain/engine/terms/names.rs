@@ -229,7 +229,7 @@ pub(crate) fn family(id: &str) -> &str {
 pub(in crate::explain::engine) fn special_case(id: &str) -> Option<&'static str> {
     match id {
         "stribeck_friction" => Some("coulomb_friction"),
-        "asymmetric_damping" => Some("viscous_friction"),
+        "asymmetric_damping" | "extra_mode" => Some("viscous_friction"),
         "hysteresis" => Some("input_backlash"),
         _ => None,
     }
