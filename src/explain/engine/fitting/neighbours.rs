@@ -23,17 +23,21 @@ pub(in crate::explain::engine) fn richer_form(
     ground: &Ground,
 ) -> Option<Fitted> {
     let argument = fitted.lead.argument.map(|a| &arguments[a]);
-    let begun = |term: &'static Term| -> Vec<(&'static Term, f64)> {
-        let new = term.shapes.last().map(|shape| shape.starts);
-        let each = new.map(|new| starts(new, argument, ground.recordings, &[]));
-        each.into_iter()
-            .flatten()
-            .map(|start| (term, start))
-            .collect()
+    let begun = |term: &'static Term| -> Vec<(&'static Term, Vec<f64>)> {
+        let mut all = vec![fitted.shapes.clone()];
+        for shape in &term.shapes[fitted.shapes.len()..] {
+            let new = starts(shape.starts, argument, ground.recordings, &[]);
+            let longer = |known: &Vec<f64>| -> Vec<Vec<f64>> {
+                let each = new.iter().map(|&v| [&known[..], &[v]].concat());
+                each.collect()
+            };
+            all = all.iter().flat_map(longer).collect();
+        }
+        all.into_iter().map(|shapes| (term, shapes)).collect()
     };
-    let each: Vec<(&Term, f64)> = richer(fitted.lead.term).iter().flat_map(begun).collect();
-    let glanced = each.into_par_iter().filter_map(|(term, start)| {
-        let shapes = [&fitted.shapes[..], &[start]].concat();
+    let forms = richer(fitted.lead.term).iter();
+    let each: Vec<(&Term, Vec<f64>)> = forms.flat_map(begun).collect();
+    let glanced = each.into_par_iter().filter_map(|(term, shapes)| {
         let strength = match term.free_strength {
             true => fitted.strength(),
             false => 1.0,

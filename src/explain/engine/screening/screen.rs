@@ -526,7 +526,9 @@ fn distinct(leads: Vec<Lead>, spec: &ModelSpec, arguments: &[Argument]) -> Vec<L
         // The same column has the same statistic.
         let near = |k: &&mut Lead| k.statistic < (1.0 + 4.0 * SAME) * lead.statistic + 1e-9;
         let like = kept.iter_mut().rev().take_while(near);
-        match like.into_iter().find(|k| k.same_as(&lead)) {
+        // Which of two sensors it is, parameters say that would have to make up for it.
+        let other_sensor = |k: &Lead| k.sensor && lead.sensor && k.place != lead.place;
+        match (like.into_iter()).find(|k| k.same_as(&lead) && !other_sensor(k)) {
             Some(known) if rank(&lead) < rank(known) => *known = lead,
             Some(_) => {}
             None => kept.push(lead),
