@@ -161,16 +161,17 @@ fn a_worm_gear_loses_a_part_of_what_drives() {
     assert!((part.abs() - 0.2).abs() < 0.02, "{part}");
 }
 
-/// A catalyst whose activity falls off exponentially from some time on, after the best step that is found first.
+/// A catalyst whose activity falls off exponentially from 60 s on: no step, and nothing else than the parameter. It may be described by
+/// an exponential from there, or by a sigmoid about the instant half-way.
 #[test]
-fn a_parameter_changes_along_an_exponential() {
+fn a_parameter_takes_its_time_to_change() {
     let feed = levels(50, 0.5, 1.5);
     let log = recorded(
         "q,c",
         (1500, 0.1),
         &[&feed],
         |x, u, t| {
-            let decay = 0.5 + 0.5 * (-f64::max(t - 60.0, 0.0) / 25.0).exp();
+            let decay = 0.5 + 0.5 * (-f64::max(t - 60.0, 0.0) / 8.0).exp();
             vec![u[0] * (2.0 - x[0]) - 0.6 * decay * x[0]]
         },
         (&[1.2], &[(0, 0.004)]),
@@ -186,6 +187,6 @@ fn a_parameter_changes_along_an_exponential() {
         number(&said, 0, "parameter_step_t0"),
         number(&said, 0, "parameter_step_T"),
     );
-    assert!((begin - 60.0).abs() < 3.0, "{begin}");
-    assert!((time - 25.0).abs() < 4.0, "{time}");
+    assert!((59.0..67.0).contains(&begin), "{begin}");
+    assert!((5.0..11.0).contains(&time), "{time}");
 }

@@ -23,21 +23,17 @@ pub(in crate::explain::engine) fn richer_form(
     ground: &Ground,
 ) -> Option<Fitted> {
     let argument = fitted.lead.argument.map(|a| &arguments[a]);
-    let begun = |term: &'static Term| -> Vec<(&'static Term, Vec<f64>)> {
-        let mut all = vec![fitted.shapes.clone()];
-        for shape in &term.shapes[fitted.shapes.len()..] {
-            let new = starts(shape.starts, argument, ground.recordings, &[]);
-            let longer = |known: &Vec<f64>| -> Vec<Vec<f64>> {
-                let each = new.iter().map(|&v| [&known[..], &[v]].concat());
-                each.collect()
-            };
-            all = all.iter().flat_map(longer).collect();
-        }
-        all.into_iter().map(|shapes| (term, shapes)).collect()
+    let begun = |term: &'static Term| -> Vec<(&'static Term, f64)> {
+        let new = term.shapes.last().map(|shape| shape.starts);
+        let each = new.map(|new| starts(new, argument, ground.recordings, &[]));
+        each.into_iter()
+            .flatten()
+            .map(|start| (term, start))
+            .collect()
     };
-    let forms = richer(fitted.lead.term).iter();
-    let each: Vec<(&Term, Vec<f64>)> = forms.flat_map(begun).collect();
-    let glanced = each.into_par_iter().filter_map(|(term, shapes)| {
+    let each: Vec<(&Term, f64)> = richer(fitted.lead.term).iter().flat_map(begun).collect();
+    let glanced = each.into_par_iter().filter_map(|(term, start)| {
+        let shapes = [&fitted.shapes[..], &[start]].concat();
         let strength = match term.free_strength {
             true => fitted.strength(),
             false => 1.0,
@@ -217,18 +213,26 @@ fn glance(study: &Study, from: &Fit) -> Option<Fit> {
     study.glance(from, GLANCE)
 }
 
-/// The best of these, fitted until nothing changes, where it gains what ties do not explain.
+/// The best of these, where it gains what ties do not explain: of each form the best at a glance, fitted until nothing changes.
 fn clearly_better(
     fitted: &Fitted,
     glanced: impl ParallelIterator<Item = Fitted>,
     ground: &Ground,
 ) -> Option<Fitted> {
-    let best = glanced.min_by(|a, b| a.fit.deviance.total_cmp(&b.fit.deviance))?;
     // A glance may not get as far as a fit; what it leaves worse than no term at all is not followed.
-    if best.fit.deviance > fitted.fit.deviance + fitted.gain {
-        return None;
+    let most = fitted.fit.deviance + fitted.gain;
+    let mut glanced: Vec<Fitted> = glanced.filter(|g| g.fit.deviance <= most).collect();
+    glanced.sort_by(|a, b| a.fit.deviance.total_cmp(&b.fit.deviance));
+    let mut forms: Vec<Fitted> = Vec::new();
+    for one in glanced {
+        let same = |f: &Fitted| (f.lead.term, &f.argument) == (one.lead.term, &one.argument);
+        if !forms.iter().any(same) {
+            forms.push(one);
+        }
     }
-    let better = thoroughly(best, ground).filter(|f| f.is_resolved(ground.study.duration()))?;
+    let thorough = forms.into_par_iter().filter_map(|f| thoroughly(f, ground));
+    let resolved = thorough.filter(|f| f.is_resolved(ground.study.duration()));
+    let better = resolved.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
     (better.gain > fitted.gain + TIE.0).then_some(better)
 }
 
