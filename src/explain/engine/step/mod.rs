@@ -10,7 +10,7 @@ use self::neighbourhood::{add_formulas, add_neighbours};
 use self::origins::Origins;
 use super::fitting::edit::Place;
 use super::fitting::finish::finished;
-use super::fitting::fitted::{Fitted, TIE, order};
+use super::fitting::fitted::{Fitted, order};
 use super::fitting::formulas::FORMULA;
 use super::hypothesis::{Ground, trials};
 use super::scope::Scope;
@@ -61,11 +61,9 @@ pub(super) fn improved(stage: &Stage, fitted: &[Fitted]) -> Option<Fit> {
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
 }
 
-/// Of fits of one term, from several starts or in several forms, the best; best first. A form with more numbers must gain what ties do
-/// not explain. Each formula is a term of its own.
+/// Of fits of one term, from several starts or in several forms, the best; best first. Each formula is a term of its own.
 fn drop_repeated(mut fitted: Vec<Fitted>) -> Vec<Fitted> {
-    let worth = |f: &Fitted| f.gain - TIE.0 * f.shapes.len() as f64;
-    fitted.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
+    fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut known: Vec<(&str, Place, String, Option<usize>)> = Vec::new();
     fitted.retain(|f| {
         let term = match f.lead.term {
@@ -77,7 +75,6 @@ fn drop_repeated(mut fitted: Vec<Fitted>) -> Vec<Fitted> {
         known.push(this);
         new
     });
-    fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     fitted
 }
 
