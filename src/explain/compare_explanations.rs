@@ -5,8 +5,8 @@ use super::explanation::{Explanation, Verdict};
 /// An effect beside a simulator that is neither linear nor reproduced by equations must take this part off the mean square of the
 /// error in blocks left out: more is explained than is not.
 const MOST: f64 = 0.5;
-/// ... and so much where it is not one of the sensors: other parameters of a simulator that is not known may look like dynamics, but
-/// not like a sensor. Three times as much is explained as is not.
+/// ... and so much where it is none of the inputs and sensors: other parameters of a simulator that is not known may look like dynamics.
+/// Three times as much is explained as is not.
 const MOST_INSIDE: f64 = 0.75;
 /// Runs whose errors differ by less than this part are equally good (the tolerance of the project's score on real recordings).
 const EQUAL: f64 = 0.02;
@@ -23,7 +23,8 @@ fn removed(explanation: &Explanation) -> f64 {
 /// The part that it must take off.
 fn needed(explanation: &Explanation) -> f64 {
     let mut effects = explanation.effects.iter();
-    match effects.all(|e| e.effect.starts_with("sensor_")) {
+    let at_port = |id: &str| id.starts_with("sensor_") || id.starts_with("input_");
+    match effects.all(|e| at_port(&e.effect)) {
         true => MOST,
         false => MOST_INSIDE,
     }
