@@ -41,6 +41,19 @@ pub(crate) fn is_doubtful(explanation: &Explanation) -> bool {
         }
 }
 
+/// Takes back names beside which blocks of the recording that were not fitted are followed worse than without them.
+pub(crate) fn unless_refuted(mut explanation: Explanation) -> Explanation {
+    let named = matches!(explanation.verdict, Verdict::Named | Verdict::Family);
+    if named && removed(&explanation) < 1.0 - (1.0 + EQUAL).powi(2) {
+        take_back(
+            &mut explanation,
+            Verdict::Unexplained,
+            "Something is left out, and the following is not sure: over blocks of the recording that were not fitted, simulations are worse with it than without it.",
+        );
+    }
+    explanation
+}
+
 /// Whether an explanation relative to a linear simulator needs no second opinion: it found nothing, or a listed effect, or a law of
 /// outputs without units, whose name depends on these.
 pub(crate) fn is_sure(explanation: &Explanation, has_units: bool) -> bool {

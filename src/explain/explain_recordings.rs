@@ -1,7 +1,9 @@
 //! The question about a linear model or columns: the ways of answering it, and the choice between their answers.
 
 use super::columns;
-use super::compare_explanations::{agree, doubt, is_doubtful, is_sure, replaces, stands_in};
+use super::compare_explanations::{
+    agree, doubt, is_doubtful, is_sure, replaces, stands_in, unless_refuted,
+};
 use super::document::explain_error::ExplainError;
 use super::effects::{self, Definition};
 use super::explanation::{Explanation, Verdict};
@@ -72,10 +74,12 @@ pub fn explain(
     match know(&checked)? {
         Simulator::Linear(known) => {
             let explanation = explain_linear(*known, &checked, &allowed, options.seed)?;
+            let explanation = unless_refuted(explanation);
             Ok(second_opinion(explanation, &checked, options))
         }
         Simulator::Nonlinear(simulator) => {
-            explain_nonlinear(&simulator, &checked, &allowed, options)
+            let explanation = explain_nonlinear(&simulator, &checked, &allowed, options)?;
+            Ok(unless_refuted(explanation))
         }
     }
 }

@@ -11,9 +11,11 @@ use super::long_recordings::Searched;
 use super::scope::Scope;
 use super::screening::along::range_along;
 use super::step::{Stage, Step, improved, step};
-use super::terms::names::named;
+use super::terms::names::{family, named, special_case};
 use super::terms::term::Needs;
-use super::thresholds::{BETTER_FITS, FINISHED, LEFT, MOST, NEEDED, SECOND, SURE, chance};
+use super::thresholds::{
+    BETTER_FITS, FINISHED, IMITATED, LEFT, MOST, NEEDED, SECOND, SURE, chance,
+};
 use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{EstimateError, EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, ModelSpec, Plant};
@@ -71,6 +73,15 @@ impl Found {
             .unwrap_or((0.0, 1))
     }
 
+    /// What its effects gain together.
+    fn gain(&self) -> f64 {
+        let accepted = self.steps.iter().take(self.accepted);
+        accepted
+            .filter_map(|step| step.first())
+            .map(|f| f.gain)
+            .sum()
+    }
+
     /// The plant with so many effects, and its fit.
     pub(crate) fn stage(&self, accepted: usize) -> (&Plant, &Fit) {
         match accepted.checked_sub(1) {
@@ -117,6 +128,10 @@ impl Found {
         }
     }
 }
+
+/// Part of the gain that an effect needs from which on it is on trial: it stands if a second beside it gains what both need together.
+/// One of two alone may say little, where the other one hides it.
+const HALF_WAY: f64 = 0.5;
 
 /// What blocks left out say of free runs, where values that depend on each other make a criterion weak. A candidate is accepted if it
 /// takes more than half of the mean square off them, and the criterion speaks for it more than chance does, or it is likelier with noise
@@ -236,6 +251,9 @@ fn without_first(
     (both - alone.gain < needed).then_some(alone)
 }
 
+/// Other first effects beside which a second is looked for, where the first leaves structure and nothing beside it explains that.
+const OTHER_FIRSTS: usize = 3;
+
 /// What the equations leave out. The fit of the plant alone may be known.
 ///
 /// # Errors
@@ -247,6 +265,63 @@ pub(crate) fn search(
     scope: &Scope,
     objective: Objective,
     known: Option<&Fit>,
+) -> Result<Found, EstimateError> {
+    let forward = |known, begun| forward(plant, recordings, hold, scope, objective, known, begun);
+    let found = forward(known, None)?;
+    let (strongest, tests) = found.left();
+    let all = found.steps.first().filter(|_| found.accepted == 1);
+    let Some([first, others @ ..]) = all.map(Vec::as_slice) else {
+        return Ok(found);
+    };
+    // Little beside a large effect is what its formula leaves, as in `decide`.
+    let little_left = chance(strongest) * tests as f64 > LEFT || strongest < SECOND.1 * first.gain;
+    if little_left || first.hypothesis.is_some() {
+        return Ok(found);
+    }
+    // One term may do some of the work of two, each of which does less alone.
+    let mut families = vec![family(named(&plant.spec, first))];
+    let mut pairs: Vec<Found> = Vec::new();
+    let least = NEEDED.max(IMITATED * first.gain);
+    let proven = |f: &Fitted| f.gain > least && f.hypothesis.is_none();
+    let of_term = |f: &Fitted| named(&plant.spec, f);
+    let proven_ids = found.steps[0].iter().filter(|f| proven(f)).map(of_term);
+    let special_cases: Vec<&str> = proven_ids.filter_map(special_case).collect();
+    for (i, other) in others.iter().enumerate() {
+        let id = of_term(other);
+        // A special case may show what it gains only beside the second.
+        let as_special_case = special_cases.contains(&id) && other.hypothesis.is_none();
+        let as_other = proven(other) && id != "law" && families.len() <= OTHER_FIRSTS;
+        if !(as_special_case || as_other) || families.contains(&family(id)) {
+            continue;
+        }
+        families.push(family(id));
+        let mut fitted = [&[first.clone()], others].concat();
+        fitted[..=i + 1].rotate_right(1);
+        let step = Step {
+            fitted,
+            strongest: found.tests[0],
+            map: found.map.clone(),
+        };
+        pairs.extend(forward(Some(&found.baseline), Some(step)).ok());
+    }
+    let least = first.gain + TIE.0.max(TIE.1 * first.gain);
+    let pairs = pairs
+        .into_iter()
+        .filter(|p| p.accepted > 1 && p.gain() > least);
+    Ok(pairs
+        .max_by(|a, b| a.gain().total_cmp(&b.gain()))
+        .unwrap_or(found))
+}
+
+/// Forward selection, from the fit of the plant alone and the first step where these are known.
+fn forward(
+    plant: &Plant,
+    recordings: &[PlantRecording],
+    hold: Hold,
+    scope: &Scope,
+    objective: Objective,
+    known: Option<&Fit>,
+    mut begun: Option<Step>,
 ) -> Result<Found, EstimateError> {
     let least_squares = objective == Objective::FreeRun;
     let mut options = EstimateOptions {
@@ -269,7 +344,9 @@ pub(crate) fn search(
     let mut accepted_so_far = 0;
     let mut asked = vec![Trial::default(); scope.hypotheses.len()];
     // Two steps more than effects may be named: the first may be dropped again, or a term stand for a curve.
-    let mut may_drop = true;
+    let mut may_drop = begun.is_none();
+    // Whether the first effect stands only if a second comes to it.
+    let mut on_trial = false;
     for _ in 0..=MOST + 2 {
         let count = accepted_so_far;
         let mut study = Study::new(&now, recordings, &options)?;
@@ -284,15 +361,21 @@ pub(crate) fn search(
         let needed = match steps.first().and_then(|s| s.first()) {
             None => NEEDED,
             // Where blocks left out, not the criterion, prove the first, no second is looked for.
-            Some(first) if first.gain <= NEEDED => f64::INFINITY,
+            Some(first) if first.gain <= NEEDED && !on_trial => f64::INFINITY,
+            Some(first) if on_trial => NEEDED + SECOND.0 - first.gain,
             Some(first) => SECOND.0.max(SECOND.1 * first.gain),
         };
         let mut attempts = 0;
+        let is_new = begun.is_none();
+        let first_step = begun.take();
         let Step {
             mut fitted,
             strongest,
             map,
         } = loop {
+            if let Some(step) = first_step {
+                break step;
+            }
             let stage = Stage {
                 plant: &now,
                 study: &study,
@@ -343,7 +426,7 @@ pub(crate) fn search(
                 continue;
             }
         }
-        if least_squares {
+        if least_squares && is_new {
             judge_by_blocks(&mut fitted, strongest.1, (&now, &fit), recordings, &options);
         }
         for &i in &open {
@@ -371,6 +454,14 @@ pub(crate) fn search(
         let accepted = best
             .filter(|f| (f.gain > needed || f.explains) && count < MOST)
             .cloned();
+        let half_way = |f: &&Fitted| {
+            count == 0 && f.hypothesis.is_none() && (f.gain > HALF_WAY * NEEDED || !is_new)
+        };
+        let accepted = accepted.or_else(|| {
+            let tried = best.filter(half_way);
+            on_trial |= tried.is_some();
+            tried.cloned()
+        });
         let Some(best) = accepted else {
             if steps.is_empty() {
                 steps.push(fitted);
@@ -400,6 +491,7 @@ pub(crate) fn search(
         if !beside {
             break;
         }
+        on_trial &= count == 0;
         options = with_more(&options, best.candidate.values.len());
         now = best.candidate.plant.clone();
         fit = best.fit.clone();
@@ -408,6 +500,12 @@ pub(crate) fn search(
         }
         steps.push(fitted);
         accepted_so_far += 1;
+    }
+    if on_trial {
+        options.free.truncate(plant.spec.parameters().len());
+        (now, fit) = (plant.clone(), baseline.clone());
+        tests.truncate(1);
+        accepted_so_far = 0;
     }
     Ok(Found {
         given: plant.clone(),

@@ -18,7 +18,7 @@ pub use simulate_explained::{AugmentedPlantError, Original};
 
 use nalgebra::DMatrix;
 
-use self::judgement::doubt::{Doubt, doubt};
+use self::judgement::doubt::{Doubt, doubt, is_safe};
 use self::judgement::free_run::astray;
 use self::judgement::joint_test::{LEVEL, joint_test};
 use self::judgement::stated_probability::probability;
@@ -294,8 +294,13 @@ impl Answer<'_> {
         let in_time = |f: &Fitted| f.lead.term.needs == Needs::Time && f.lead.term.id != "periodic";
         let later = self.effects().any(in_time);
         let doubted = self.effects().any(|fitted| self.doubt(fitted).is_some());
-        let relied_on =
-            verdict != Verdict::Unexplained || effects.is_empty() || better && !later && !doubted;
+        let safe = self.effects().enumerate().all(|(i, fitted)| {
+            let law = self.law(fitted);
+            law.is_none_or(|law| is_safe(fitted, &law, self.spec_before(i)))
+        });
+        let relied_on = verdict != Verdict::Unexplained
+            || effects.is_empty()
+            || better && !later && !doubted && safe;
         if !relied_on {
             summary.push(
                 "It is not sure enough to predict with: `simulate` uses the equations without it."

@@ -69,7 +69,13 @@ impl Answer<'_> {
         };
         let place = match fitted.lead.place {
             Place::Equation(_) if fitted.lead.sensor => format!("the sensor {enters}"),
-            Place::Equation(_) => format!("the equation of {at}"),
+            Place::Equation(_) => match fitted.lead.arrives {
+                Some((other, _)) => {
+                    let other = before.equations[other].unknown.variable();
+                    format!("the equations of {at} and {}", name(other))
+                }
+                None => format!("the equation of {at}"),
+            },
             Place::Input(_) => format!("the input {enters}"),
             Place::Parameter(_) => format!("the parameter {at}"),
         };
@@ -234,7 +240,7 @@ impl Answer<'_> {
     }
 
     /// What is added to an equation, as a curve of its one argument, with its standard deviation.
-    fn law(&self, fitted: &Fitted) -> Option<Law> {
+    pub(super) fn law(&self, fitted: &Fitted) -> Option<Law> {
         let term = fitted.lead.term;
         if term.port != Port::Equation || !term.memories.is_empty() {
             return None;
@@ -242,7 +248,7 @@ impl Answer<'_> {
         // Of a difference or a product of variables, it is the curve of that.
         let variable = match fitted.depends.as_slice() {
             [] => return None,
-            [one] => one.clone(),
+            [one] if fitted.hypothesis.is_some() => one.clone(),
             _ if fitted.hypothesis.is_some() => return None,
             _ => fitted.argument.clone(),
         };
@@ -256,7 +262,8 @@ impl Answer<'_> {
         let covariance = &self.within_bounds;
         let mut slopes = Vec::new();
         for (i, &p) in at_point.iter().enumerate() {
-            let step = DIFFERENCE * (values[i].abs() + covariance[(p, p)].max(0.0).sqrt());
+            let std = covariance[(p, p)].max(0.0).sqrt();
+            let step = DIFFERENCE * (values[i].abs() + if std.is_finite() { std } else { 0.0 });
             let mut moved = values.clone();
             moved[i] += step;
             let there = self.curve_of(fitted, &moved, &at)?;
@@ -281,8 +288,11 @@ impl Answer<'_> {
                     }
                 }
             }
-            let std = variance.max(0.0).sqrt();
-            if std.is_finite() { std } else { unknown }
+            if variance.is_finite() {
+                variance.max(0.0).sqrt()
+            } else {
+                unknown
+            }
         });
         Some(Law {
             variable,
@@ -302,30 +312,21 @@ impl Answer<'_> {
             return Some(at.iter().map(|&z| curve.at(z)).collect());
         }
         let term = fitted.lead.term;
+        let parameter = |name: &str| {
+            let spec = &self.found.plant.spec;
+            let mut parameters = spec.parameters().into_iter();
+            let at = parameters.position(|v| spec.variable(v).name == name)?;
+            Some(format!("({:e})", self.found.fit.point[at]))
+        };
         let text = match fitted.hypothesis.and_then(|i| self.hypotheses.get(i)) {
             Some(hypothesis) => hypothesis.as_law("z", |word| {
                 let own = hypothesis.numbers().iter().position(|n| n.name == word);
-                let value = match own {
-                    Some(i) => values[i],
-                    None => {
-                        let spec = &self.found.plant.spec;
-                        let parameters = spec.parameters();
-                        let at = parameters
-                            .iter()
-                            .position(|&v| spec.variable(v).name == word)?;
-                        self.found.fit.point[at]
-                    }
-                };
-                Some(format!("({value:e})"))
+                own.map_or_else(|| parameter(word), |i| Some(format!("({:e})", values[i])))
             })?,
             None => {
                 let shapes: Vec<String> = values.iter().map(|v| format!("({v:e})")).collect();
-                let strength = shapes.last()?;
-                let argument = match fitted.depends.as_slice() {
-                    [one] => fitted.argument.replace(one, "z"),
-                    _ => "z".to_owned(),
-                };
-                let form = filled(term.form, term, &argument, &[], &shapes, 1.0);
+                let strength = shapes.get(term.shapes.len())?;
+                let form = filled(term.form, term, "z", &[], &shapes, (0.0, 1.0));
                 format!("{strength}*({})", about_usual(&form, fitted.usual))
             }
         };

@@ -16,6 +16,8 @@ const LEAST_SPREAD: f64 = 1e-3;
 
 /// Least and most part of a whole.
 const LEAST_SHARE: (f64, f64) = (0.001, 0.95);
+/// Least and greatest power: laws of physics have powers from 1/4 (laminar convection) to 4 (radiation).
+const POWERS: (f64, f64) = (0.25, 4.0);
 /// Least yield of bristles, as a part of the value that is started from.
 const LEAST_YIELD: f64 = 0.05;
 
@@ -54,7 +56,8 @@ pub(crate) fn candidate(
     recordings: &[PlantRecording],
 ) -> Option<Candidate> {
     let term = lead.term;
-    let h = recordings.first()?.sample_time;
+    let first = recordings.first()?;
+    let (h, times) = (first.sample_time, (first.start_time, first.sample_time));
     let argument = lead.argument.map(|a| &arguments[a]);
     let mut edit = Edit::default();
     let mut values = Vec::new();
@@ -71,6 +74,7 @@ pub(crate) fn candidate(
                 f64::INFINITY,
             ),
             Starts::Share(_) => LEAST_SHARE,
+            Starts::Powers(_) => POWERS,
             Starts::Travel(_) => {
                 // What yields within a sample is a function of the sign, which has terms of its own.
                 let of_a_sample = argument
@@ -119,7 +123,7 @@ pub(crate) fn candidate(
             format!("({})", &spec.text[span.start..span.end])
         },
     );
-    let body = filled(term.form, term, &text, &memories, &shapes, h).replace("{a}", &factor);
+    let body = filled(term.form, term, &text, &memories, &shapes, times).replace("{a}", &factor);
     let body = about_usual(&body, argument.map_or(0.0, Argument::usual));
     let rate = argument.and_then(|a| a.rate.as_deref());
     let body = match body.contains("{dz}") {
@@ -138,7 +142,7 @@ pub(crate) fn candidate(
             text.clone()
         };
         let previous = memory.previous(&memories);
-        let rate = filled(memory.rate, term, &source, &previous, &shapes, h);
+        let rate = filled(memory.rate, term, &source, &previous, &shapes, times);
         let free = memory.has_free_start(argument);
         edit.declarations
             .push(memory.declaration(name, first, free));
@@ -176,6 +180,21 @@ pub(crate) fn candidate(
     };
     debug_assert!(!(lead.sensor && term.port != Port::Sensor));
     edit.changes.push((lead.place, format!("{{v}} + {added}")));
+    if let Some((other, strength)) = lead.arrives {
+        let there = spec.variable(spec.equations[other].unknown.variable());
+        let wanted = format!("{}_{}_{}", term.id, term.symbol, there.column());
+        let name = free_name(spec, &wanted);
+        let change = format!("{{v}} + {name}*({body})");
+        edit.changes.push((Place::Equation(other), change));
+        edit.parameters.push(NewParameter {
+            name,
+            value: strength,
+            min: f64::NEG_INFINITY,
+            max: f64::INFINITY,
+            description: String::new(),
+        });
+        values.push(strength);
+    }
     let mut changed = edit.apply(spec).ok()?;
     let mut starts = vec![Vec::new(); recordings.len()];
     for (memory, name) in term.memories.iter().zip(&memories) {
@@ -192,12 +211,22 @@ pub(crate) fn candidate(
         (state.uncorrected, state.starts) = (true, of_recordings);
     }
     let names = edit.parameters.iter().map(|p| p.name.clone()).collect();
-    let equation = equation_text(&changed, spec, lead.place);
+    let places = [
+        Some(lead.place),
+        lead.arrives.map(|(at, _)| Place::Equation(at)),
+    ];
+    let changed_equations = places
+        .into_iter()
+        .flatten()
+        .map(|place| equation_text(&changed, spec, place));
+    let changed_equations: Vec<String> = changed_equations.collect();
     let own = edit
         .equations
         .iter()
         .map(|e| e.trim().trim_end_matches(';'));
-    let equations: Vec<&str> = [equation.as_str()].into_iter().chain(own).collect();
+    let equations: Vec<&str> = (changed_equations.iter().map(String::as_str))
+        .chain(own)
+        .collect();
     Some(Candidate {
         equation: equations.join("; "),
         plant: Plant::new(changed),

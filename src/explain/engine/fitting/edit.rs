@@ -1,8 +1,8 @@
 //! Changes of a plant's text: terms that enter its equations, and the variables and parameters that they need.
 
 use crate::physics::{
-    Binary, Equation, ExpressionId, ModelSpec, Node, Span, SpecError, Unknown, VariableId,
-    VariableKind, parse,
+    Binary, Equation, ExpressionId, ModelSpec, Node, Span, SpecError, Token, Unknown, VariableId,
+    VariableKind, parse, tokens,
 };
 
 /// Name of a variable for what several rates share.
@@ -244,13 +244,18 @@ impl Edit {
     /// The plant with the change.
     pub(crate) fn apply(&self, spec: &ModelSpec) -> Result<ModelSpec, SpecError> {
         let mut changed = parse(&self.text(spec))?;
-        for known in spec.variables.iter().filter(|v| v.uncorrected) {
-            if let Some(state) = changed.find(&known.name) {
-                let state = &mut changed.variables[state.index()];
-                (state.uncorrected, state.starts) = (true, known.starts.clone());
-            }
-        }
+        keep_states_of_effects(&mut changed, spec);
         Ok(changed)
+    }
+}
+
+/// Marks the states that effects have added to a plant in a changed text of it: no text says which they are.
+pub(in crate::explain::engine) fn keep_states_of_effects(changed: &mut ModelSpec, of: &ModelSpec) {
+    for known in of.variables.iter().filter(|v| v.uncorrected) {
+        if let Some(state) = changed.find(&known.name) {
+            let state = &mut changed.variables[state.index()];
+            (state.uncorrected, state.starts) = (true, known.starts.clone());
+        }
     }
 }
 
@@ -267,6 +272,21 @@ pub(crate) fn acting(spec: &ModelSpec, v: VariableId) -> String {
 /// Whether an expression needs no parentheses as a term of a sum.
 fn simple(text: &str) -> bool {
     !text.trim_start().starts_with("if") && !text.contains("if ")
+}
+
+/// An expression with other names in it.
+pub(crate) fn with_names(expression: &str, new: impl Fn(&str) -> Option<String>) -> String {
+    let Ok(parts) = tokens(expression) else {
+        return expression.to_owned();
+    };
+    let names = parts.into_iter().filter(|(token, _)| *token == Token::Name);
+    let pieces =
+        names.filter_map(|(_, span)| Some((span, new(&expression[span.start..span.end])?)));
+    let whole = Span {
+        start: 0,
+        end: expression.len(),
+    };
+    substituted(expression, whole, pieces.collect())
 }
 
 /// A part of the text with pieces of it replaced.

@@ -57,7 +57,15 @@ pub(in crate::explain::engine) fn alone(
         ),
         None => None,
     };
-    let lead = second.lead.clone().at(place, argument, &second.shapes);
+    let mut lead = second.lead.clone().at(place, argument, &second.shapes);
+    let from = &first.candidate.plant.spec;
+    lead.arrives = match lead.arrives {
+        Some((at, strength)) => match same_place(Place::Equation(at), from, spec)? {
+            Place::Equation(at) => Some((at, strength)),
+            _ => None,
+        },
+        None => None,
+    };
     let made = candidate(spec, &lead, &arguments, recordings)?;
     // From the numbers of both: those of the plant, with those of the second alone.
     let own = study.parameters();

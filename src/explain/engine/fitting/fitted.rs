@@ -97,6 +97,19 @@ impl Fitted {
         self.fit.point.get(at).copied().unwrap_or(0.0)
     }
 
+    /// The second equation that the term enters, and its strength there.
+    pub(in crate::explain::engine) fn arrives(&self) -> Option<(usize, f64)> {
+        let (at, _) = self.lead.arrives?;
+        let last = self
+            .candidate
+            .plant
+            .spec
+            .parameters()
+            .len()
+            .checked_sub(1)?;
+        Some((at, self.fit.point.get(last).copied()?))
+    }
+
     /// The gain without the [`FEW`] values that it owes most to.
     pub(in crate::explain::engine) fn gain_without_few(
         &self,
@@ -161,7 +174,7 @@ pub(in crate::explain::engine) fn searched(lead: &Lead, recordings: &[PlantRecor
             | Starts::Moved(_)
             | Starts::Rate(_)
             | Starts::RateSize(_) => 2.0,
-            Starts::Values(_) | Starts::Share(_) => 0.0,
+            Starts::Values(_) | Starts::Powers(_) | Starts::Share(_) => 0.0,
         })
         .sum()
 }

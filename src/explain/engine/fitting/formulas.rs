@@ -21,7 +21,7 @@ pub(in crate::explain::engine) const FORMULA: &str = "formula";
 
 const WIDTHS: Starts = Starts::Spread(&[0.1, 0.2, 0.5, 1.0, 2.0]);
 const MIDDLES: Starts = Starts::Quantiles(&[0.1, 0.3, 0.5, 0.7, 0.9]);
-const POWERS: Starts = Starts::Values(&[0.5, 1.5, 2.5, 4.0]);
+const POWERS: Starts = Starts::Powers(&[0.5, 1.5, 2.5, 4.0]);
 
 /// Functions of one variable with one or two shapes: powers, growth, decay, saturation, rise and fall.
 const FORMULAS: &[Term] = &[
@@ -265,30 +265,22 @@ pub(super) fn in_its_place(
     arguments: &[Argument],
     ground: &Ground,
 ) -> Option<Fitted> {
-    at_place(
-        best,
-        best.lead.place,
-        (term, argument),
-        (shapes, strength),
-        fitted,
-        arguments,
-        ground,
-    )
+    let place = best.lead.place;
+    let mut lead = Lead::untested(term, place).at(place, argument, shapes);
+    (lead.strength, lead.arrives) = (strength, best.arrives());
+    instead(best, lead, fitted, arguments, ground)
 }
 
-/// The same at another place.
-pub(super) fn at_place(
+/// Another lead in the place of a fit's.
+pub(super) fn instead(
     best: &Fitted,
-    place: Place,
-    (term, argument): (&'static Term, Option<usize>),
-    (shapes, strength): (&[f64], f64),
+    mut lead: Lead,
     fitted: &dyn Fn(&Study, &Fit) -> Option<Fit>,
     arguments: &[Argument],
     ground: &Ground,
 ) -> Option<Fitted> {
     let (study, plant) = (ground.study, ground.plant);
-    let mut lead = Lead::untested(term, place).at(place, argument, shapes);
-    (lead.strength, lead.sensor) = (strength, term.port == Port::Sensor);
+    lead.sensor = lead.term.port == Port::Sensor;
     let made = candidate(&plant.spec, &lead, arguments, ground.recordings)?;
     let options = with_more(ground.options, made.values.len());
     let rough = made.rough(study, MOST_STEPS);
@@ -297,6 +289,7 @@ pub(super) fn at_place(
     let without = best.without_term(parameters);
     let start = made.from(&without, parameters);
     let fit = fitted(&inner, &start)?;
+    let argument = lead.argument.map(|a| &arguments[a]);
     let fitted = Fitted {
         gain: ground.fit.criterion - fit.criterion - searched(&lead, ground.recordings),
         shapes: fit.point[parameters..][..lead.shapes.len()].to_vec(),
@@ -305,6 +298,5 @@ pub(super) fn at_place(
         fit,
         ..best.clone()
     };
-    let argument = argument.map(|a| &arguments[a]);
     Some(fitted.depending_on(argument, &plant.spec, ground.recordings))
 }

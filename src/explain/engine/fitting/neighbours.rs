@@ -4,16 +4,17 @@ use rayon::prelude::*;
 
 use crate::explain::engine::fitting::edit::{Place, places};
 use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
-use crate::explain::engine::fitting::formulas::{at_place, in_its_place};
+use crate::explain::engine::fitting::formulas::{in_its_place, instead};
 use crate::explain::engine::hypothesis::Ground;
+use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::TERMS;
 use crate::explain::engine::terms::richer::richer;
 use crate::explain::engine::terms::term::{Needs, Port, Term, curve};
 use crate::explain::engine::terms::values::starts;
 use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH, limited};
-use crate::physics::ModelSpec;
 use crate::physics::estimate::{Fit, PlantRecording, Study};
+use crate::physics::{ModelSpec, Unknown};
 
 /// The richer form of a fit's term that fits best, where that gains what ties do not explain. What the simple form leaves would else
 /// be taken for a second effect.
@@ -80,6 +81,55 @@ pub(in crate::explain::engine) fn of_one_variable(
             arguments,
             ground,
         )
+    });
+    clearly_better(fitted, glanced, ground)
+}
+
+/// Parts of what leaves one equation that start as what arrives in another.
+const ARRIVES: [f64; 2] = [1.0, 0.1];
+
+/// The same in a second equation too, with a strength of its own, where that gains what ties do not explain: what flows over the rim of
+/// one tank falls into the next, and what heats one body cools another. Where it is a function of the state of the second, it leaves
+/// that one.
+pub(in crate::explain::engine) fn also_elsewhere(
+    fitted: &Fitted,
+    given: &ModelSpec,
+    arguments: &[Argument],
+    ground: &Ground,
+) -> Option<Fitted> {
+    let (spec, lead) = (&ground.plant.spec, &fitted.lead);
+    let (Place::Equation(here), Some(argument)) = (lead.place, lead.argument) else {
+        return None;
+    };
+    let plain = lead.term.free_strength && lead.curve.is_none() && !lead.term.form.contains("{a}");
+    if !plain || lead.sensor || lead.arrives.is_some() {
+        return None;
+    }
+    let of = &arguments[argument].variables;
+    let own = lead.place.variable(spec);
+    let others = places(spec, given).into_iter().filter_map(|place| {
+        let Place::Equation(at) = place else {
+            return None;
+        };
+        let is_rate = matches!(spec.equations[at].unknown, Unknown::Derivative(_));
+        let is_joined = of.contains(&place.variable(spec))
+            || place.uses(spec, own)
+            || of.iter().any(|v| place.uses(spec, *v));
+        (at != here && is_rate && is_joined).then_some(at)
+    });
+    let strength = fitted.strength();
+    let starts = others.flat_map(|at| ARRIVES.map(|part| (at, -part * strength)));
+    let starts: Vec<(usize, f64)> = starts.collect();
+    let glanced = starts.into_par_iter().filter_map(|(at, there)| {
+        let mut lead = lead.clone();
+        lead.shapes.clone_from(&fitted.shapes);
+        (lead.strength, lead.arrives) = (strength, Some((at, there)));
+        let source = spec.equations[at].unknown.variable();
+        if of.contains(&source) && !of.contains(&own) {
+            lead.place = Place::Equation(at);
+            (lead.strength, lead.arrives) = (there, Some((here, strength)));
+        }
+        instead(fitted, lead, &glance, arguments, ground)
     });
     clearly_better(fitted, glanced, ground)
 }
@@ -154,15 +204,9 @@ pub(in crate::explain::engine) fn as_parameter_changes(
         let glanced = starts
             .into_par_iter()
             .filter_map(|(from, (shapes, strength))| {
-                at_place(
-                    from,
-                    place,
-                    (term, None),
-                    (&shapes, strength),
-                    &glance,
-                    arguments,
-                    ground,
-                )
+                let mut lead = Lead::untested(term, place).at(place, None, &shapes);
+                lead.strength = strength;
+                instead(from, lead, &glance, arguments, ground)
             });
         let best = glanced.min_by(|a, b| a.fit.deviance.total_cmp(&b.fit.deviance))?;
         thoroughly(best, ground)
@@ -225,7 +269,8 @@ fn clearly_better(
     glanced.sort_by(|a, b| a.fit.deviance.total_cmp(&b.fit.deviance));
     let mut forms: Vec<Fitted> = Vec::new();
     for one in glanced {
-        let same = |f: &Fitted| (f.lead.term, &f.argument) == (one.lead.term, &one.argument);
+        let form = |f: &Fitted| (f.lead.term, f.lead.place, f.lead.arrives.map(|(at, _)| at));
+        let same = |f: &Fitted| (form(f), &f.argument) == (form(&one), &one.argument);
         if !forms.iter().any(same) {
             forms.push(one);
         }

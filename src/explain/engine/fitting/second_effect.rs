@@ -42,10 +42,15 @@ pub(in crate::explain::engine) fn determined(
     }
     let options = with_more(options, found.candidate.values.len());
     let at = options.free.len() - 1;
-    study.of(&found.candidate.plant, &options).is_ok_and(|own| {
-        let away = own.deviations_from_zero(&found.fit, at);
-        away.is_some_and(|away| away > DETERMINED)
-    })
+    let Ok(own) = study.of(&found.candidate.plant, &options) else {
+        return false;
+    };
+    // Where no parameter is at a bound, the gain says it: of a hard stop only its place is determined, and how hard it is is not.
+    let at_no_bound = own.inside(&found.fit).len() == found.fit.point.len();
+    at_no_bound
+        || own
+            .deviations_from_zero(&found.fit, at)
+            .is_some_and(|away| away > DETERMINED)
 }
 
 /// Drops what may not be named beside an effect, but for the best term and the best curve: what these explain as well is no

@@ -2,10 +2,12 @@
 
 use super::{Change, Hypothesis, HypothesisErrorKind as Kind};
 use crate::explain::engine::fitting::candidate::{Candidate, equation_text, free_name};
-use crate::explain::engine::fitting::edit::{Edit, Place, literal, sections};
+use crate::explain::engine::fitting::edit::{
+    Edit, Place, keep_states_of_effects, literal, sections, with_names,
+};
 use crate::physics::{
-    Equation, ExpressionId, ModelSpec, Node, Span, SpecErrorKind, Token, Unknown, VariableId,
-    VariableKind, nearest, parse, tokens,
+    Equation, ExpressionId, ModelSpec, Node, Span, SpecErrorKind, Unknown, VariableId,
+    VariableKind, nearest, parse,
 };
 
 /// What an equation determines, by name: the same in every plant that has been changed.
@@ -165,20 +167,7 @@ fn unknown(left: &str, spec: &ModelSpec) -> Kind {
 impl Hypothesis {
     /// The expression with other words for its new parameters.
     pub(crate) fn expression_with(&self, word: impl Fn(&str) -> Option<String>) -> String {
-        let Ok(parts) = tokens(&self.expression) else {
-            return self.expression.clone();
-        };
-        let (mut text, mut at) = (String::new(), 0);
-        for (token, span) in parts {
-            if token == Token::Name
-                && let Some(new) = word(&self.expression[span.start..span.end])
-            {
-                text.push_str(&self.expression[at..span.start]);
-                text.push_str(&new);
-                at = span.end;
-            }
-        }
-        text + &self.expression[at..]
+        with_names(&self.expression, word)
     }
 
     /// What it adds to a right-hand side as a function of `variable`; none where it adds nothing, or depends on more.
@@ -277,10 +266,11 @@ impl Hypothesis {
             ..Edit::default()
         };
         let text = edit.text(spec);
-        let changed = parse(&text).map_err(|e| {
+        let mut changed = parse(&text).map_err(|e| {
             let new = edit.declarations.len() + usize::from(!matches!(place, Place::Equation(_)));
             Kind::Unsolved(in_lines_of(&spec.text, new, *e.kind))
         })?;
+        keep_states_of_effects(&mut changed, spec);
         Ok(Candidate {
             equation: equation_text(&changed, spec, place),
             plant: crate::physics::Plant::new(changed),

@@ -60,6 +60,8 @@ pub(crate) struct Lead {
     pub(crate) statistic: f64,
     /// What stands for the form of a curve.
     pub(crate) curve: Option<Curve>,
+    /// A second equation that the term enters, and its strength there: what leaves one balance arrives in another.
+    pub(crate) arrives: Option<(usize, f64)>,
     /// Products of its column with a few columns of noise: two terms that do the same to the recording have the same.
     signature: [f64; SIGNATURE],
 }
@@ -90,6 +92,7 @@ impl Lead {
             shift: vec![],
             statistic: 0.0,
             curve: None,
+            arrives: None,
             signature: [0.0; SIGNATURE],
         }
     }
@@ -326,6 +329,7 @@ impl Tests<'_> {
             shift: tested.shift,
             statistic: tested.statistic,
             curve: None,
+            arrives: None,
             signature: tested.signature,
         })
     }

@@ -6,7 +6,7 @@ use crate::explain::engine::fitting::edit::Place;
 use crate::explain::engine::fitting::fitted::{Fitted, TIE};
 use crate::explain::engine::fitting::formulas::formulas;
 use crate::explain::engine::fitting::neighbours::{
-    as_parameter_changes, as_plain_functions, of_one_variable, richer_form,
+    also_elsewhere, as_parameter_changes, as_plain_functions, of_one_variable, richer_form,
 };
 use crate::explain::engine::fitting::refined_curve::refined_curve;
 use crate::explain::engine::hypothesis::Ground;
@@ -62,6 +62,9 @@ pub(super) fn add_neighbours(
         let close = rank == 0 && one.gain > (1.0 - TIE.1) * best;
         let of_one = || of_one_variable(one, arguments, ground);
         if let Some(better) = richer.or_else(|| close.then(of_one).flatten()) {
+            *one = better;
+        }
+        if let Some(better) = also_elsewhere(one, stage.given, arguments, ground) {
             *one = better;
         }
     }

@@ -225,6 +225,13 @@ impl Argument {
             }
             Needs::OneWay => self.velocity && self.quantile(0.0) * self.quantile(1.0) > 0.0,
             Needs::OwnState => self.form == ArgumentForm::Variable && !self.held,
+            Needs::SwitchedOn => {
+                self.held
+                    && self
+                        .values
+                        .iter()
+                        .all(|v| v.first().is_some_and(|u| *u != 0.0))
+            }
             Needs::Time => false,
         }
     }

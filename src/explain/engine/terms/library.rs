@@ -14,7 +14,7 @@ pub(super) const TIMES: &[f64] = &[
 
 use Needs::{
     AlongPath, Angle, Anything, BothSigns, Difference, Directed, Driven, OneWay, OwnState,
-    Positive, Radiation, Stretch, Time, Velocity,
+    Positive, Radiation, Stretch, SwitchedOn, Time, Velocity,
 };
 use Port::{Equation, Input, Parameter, Sensor};
 
@@ -59,6 +59,33 @@ const WAVE: &[Shape] = &[
         false,
     ),
 ];
+
+/// What acts a time after an input.
+const fn later(needs: Needs, form: &'static str) -> Term {
+    const TIME: Shape = shape("T", Starts::Samples(&[0.5, 1.0, 2.0, 4.0, 8.0]), true);
+    Term {
+        form,
+        needs,
+        ..in_place("input_delay", &[], &[TIME])
+    }
+}
+
+/// What follows an input.
+const fn lagging(needs: Needs, memories: &'static [Memory]) -> Term {
+    const TIME: Shape = shape("T", Starts::Samples(&[0.5, 2.0, 6.0, 20.0]), true);
+    Term {
+        needs,
+        ..in_place("actuator_lag", memories, &[TIME])
+    }
+}
+
+const fn lag(start: MemoryStart) -> Memory {
+    Memory {
+        rate: "({z} - {m})/{T}",
+        start,
+        sampled: false,
+    }
+}
 
 /// The library.
 pub(crate) const TERMS: &[Term] = &[
@@ -380,36 +407,13 @@ pub(crate) const TERMS: &[Term] = &[
     curve("input_asymmetry", Input, Directed, "min({z}, 0)", &[]),
     curve("input_square", Input, Anything, "{z}^2", &[]),
     curve("input_cube", Input, Anything, "{z}^3", &[]),
-    Term {
-        id: "input_delay",
-        port: Input,
-        needs: Anything,
-        form: "delay({z}, {T}) - {z}",
-        memories: &[],
-        shapes: &[shape(
-            "T",
-            Starts::Samples(&[0.5, 1.0, 2.0, 4.0, 8.0]),
-            true,
-        )],
-        free_strength: false,
-        symbol: "",
-        units: &[],
-    },
-    Term {
-        id: "actuator_lag",
-        port: Input,
-        needs: Anything,
-        form: "{m} - {z}",
-        memories: &[Memory {
-            rate: "({z} - {m})/{T}",
-            start: MemoryStart::Argument,
-            sampled: false,
-        }],
-        shapes: &[shape("T", Starts::Samples(&[0.5, 2.0, 6.0, 20.0]), true)],
-        free_strength: false,
-        symbol: "",
-        units: &[],
-    },
+    later(Anything, "delay({z}, {T}) - {z}"),
+    later(
+        SwitchedOn,
+        "(if time > {begin} + {T} then delay({z}, {T}) else 0.0) - {z}",
+    ),
+    lagging(Anything, &[lag(MemoryStart::Argument)]),
+    lagging(SwitchedOn, &[lag(MemoryStart::Zero)]),
     in_place(
         "input_backlash",
         &[sampled("min(max({m}, {z} - {g}), {z} + {g})")],

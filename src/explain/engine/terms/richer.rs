@@ -36,7 +36,7 @@ pub(in crate::explain::engine) fn richer(term: &Term) -> &'static [Term] {
 const DAMPING: Shape = shape("V", Starts::RateSize(&[1.0, 4.0]), true);
 
 /// Power of a height over a crest.
-const POWER: Shape = shape("p", Starts::Values(&[1.5]), true);
+const POWER: Shape = shape("p", Starts::Powers(&[1.5]), true);
 /// The other side of two that differ.
 const OTHER: Shape = shape(
     "other",

@@ -42,6 +42,8 @@ pub(crate) enum Needs {
     Directed,
     /// The state whose derivative the equation determines.
     OwnState,
+    /// What is switched on as each recording begins: it is not zero at the first sample, and may have been before.
+    SwitchedOn,
     /// No argument: a function of time alone.
     Time,
 }
@@ -74,6 +76,8 @@ pub(crate) enum Starts {
     Samples(&'static [f64]),
     /// As they stand.
     Values(&'static [f64]),
+    /// Powers, as they stand.
+    Powers(&'static [f64]),
     /// Frequencies at which the spectrum of the residual has its peaks.
     Peaks,
     /// Parts of a whole.
@@ -134,7 +138,8 @@ pub(crate) struct Term {
     pub(crate) id: &'static str,
     pub(crate) port: Port,
     pub(crate) needs: Needs,
-    /// Function of `{z}`, of the shapes, and of the memories; the strength is its factor. `{v}` is what stands at the place,
+    /// Function of `{z}`, of the shapes, of the memories, and of the time `{begin}` at which the recordings begin; the strength is its
+    /// factor. `{v}` is what stands at the place,
     /// `{a}` the factor of the derivative there, `{-usual}` ` - ` and a usual value of `{z}`, `{-usual^2}` its square.
     pub(crate) form: &'static str,
     pub(crate) memories: &'static [Memory],

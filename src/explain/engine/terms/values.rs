@@ -53,7 +53,7 @@ pub(in crate::explain::engine) fn starts(
             counts.iter().map(|c| c * measured).collect()
         }
         Starts::Moved(counts) => of(counts, &|a, n| n * a.spread() * h),
-        Starts::Values(values) | Starts::Share(values) => values.to_vec(),
+        Starts::Values(values) | Starts::Powers(values) | Starts::Share(values) => values.to_vec(),
         Starts::Peaks => peaks.to_vec(),
     }
 }
@@ -122,10 +122,11 @@ pub(crate) fn filled(
     argument: &str,
     memories: &[String],
     shapes: &[String],
-    sample_time: f64,
+    (begin, sample_time): (f64, f64),
 ) -> String {
     let mut text = form
         .replace("{z}", argument)
+        .replace("{begin}", &format!("({})", literal(begin)))
         .replace("{fast}", &literal(FAST / sample_time));
     for (symbol, name) in MEMORIES.iter().zip(memories) {
         text = text.replace(symbol, name);
@@ -185,7 +186,8 @@ fn values_and_ends(
     recordings: &[PlantRecording],
     hold: Option<Hold>,
 ) -> Option<Vec<[Series; 2]>> {
-    let h = recordings.first()?.sample_time;
+    let first = recordings.first()?;
+    let (h, times) = (first.sample_time, (first.start_time, first.sample_time));
     let mut used: Vec<usize> = instances.iter().filter_map(|i| i.argument).collect();
     used.sort_unstable();
     used.dedup();
@@ -210,7 +212,7 @@ fn values_and_ends(
             // What stands at the place is what parameters scale, and a size of the term does not matter here.
             let fill = |argument: &str| {
                 let form = instance.term.form;
-                let text = filled(form, instance.term, argument, &memories, &shapes, h)
+                let text = filled(form, instance.term, argument, &memories, &shapes, times)
                     .replace("{v}", "0.0")
                     .replace("{a}", "1.0");
                 about_usual(&text, 0.0)
@@ -226,7 +228,14 @@ fn values_and_ends(
                 let start = memory.start.at(first);
                 text.push_str(&memory.declaration(name, start, false));
                 let previous = memory.previous(&memories);
-                let rate = filled(memory.rate, instance.term, &argument, &previous, &shapes, h);
+                let rate = filled(
+                    memory.rate,
+                    instance.term,
+                    &argument,
+                    &previous,
+                    &shapes,
+                    times,
+                );
                 equations.push_str(&memory.equation(name, &rate));
             }
         }

@@ -1,8 +1,10 @@
 //! Why an effect that the criterion is sure of is not named: the recording does not tell it from something else.
 
+use crate::explain::engine::fitting::edit::Place;
 use crate::explain::engine::fitting::fitted::Fitted;
-use crate::physics::ModelSpec;
+use crate::explain::explanation::Law;
 use crate::physics::estimate::PlantRecording;
+use crate::physics::{ModelSpec, Unknown};
 
 /// A change of an input from one sample to the next by this part of its range is a step.
 const STEP: f64 = 0.25;
@@ -52,6 +54,25 @@ pub(in crate::explain::plant_answer) fn doubt(
     Some(Doubt::WithInput(
         spec.variable(variable).column().to_owned(),
     ))
+}
+
+/// Whether an unproven law may predict: it is known better than its size is throughout its range, and does not grow with the state that
+/// it drives. Beyond its range such a law carries the state away.
+pub(in crate::explain::plant_answer) fn is_safe(
+    fitted: &Fitted,
+    law: &Law,
+    spec: &ModelSpec,
+) -> bool {
+    let largest = law.value.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let known = law.std.iter().all(|std| *std < largest);
+    let own = fitted.lead.place.variable(spec);
+    let drives_own = matches!(fitted.lead.place, Place::Equation(at) if spec.equations[at].unknown == Unknown::Derivative(own))
+        && law.variable.trim_start_matches('(').split(' ').next()
+            == Some(spec.variable(own).name.as_str());
+    let grows = |pair: Option<&[f64]>| pair.is_some_and(|v| v[1] > v[0]);
+    let mut steps = law.value.windows(2);
+    let (first, last) = (steps.next(), steps.next_back());
+    known && !(drives_own && (grows(first) || grows(last)))
 }
 
 /// The input that steps at an instant, where its steps are so few that this is no chance.
