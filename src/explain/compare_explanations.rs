@@ -41,10 +41,13 @@ pub(crate) fn is_doubtful(explanation: &Explanation) -> bool {
         }
 }
 
-/// Takes back names beside which blocks of the recording that were not fitted are followed worse than without them.
+/// Takes back names beside which blocks of the recording that were not fitted are followed worse than without them. What is read off
+/// the data, such as the step of a coarse sensor, has no gain in a criterion and makes no fit better.
 pub(crate) fn unless_refuted(mut explanation: Explanation) -> Explanation {
     let named = matches!(explanation.verdict, Verdict::Named | Verdict::Family);
-    if named && removed(&explanation) < 1.0 - (1.0 + EQUAL).powi(2) {
+    let mut effects = explanation.effects.iter();
+    let fitted = effects.any(|e| e.evidence.criterion_gain > 0.0);
+    if named && fitted && removed(&explanation) < 1.0 - (1.0 + EQUAL).powi(2) {
         take_back(
             &mut explanation,
             Verdict::Unexplained,
@@ -196,6 +199,11 @@ mod tests {
         assert_eq!(judged(1.0, 0.9, true), (Verdict::Parameters, 0));
         assert_eq!(judged(1.0, 1.1, true), (Verdict::Parameters, 0));
         assert_eq!(judged(1.0, 0.5, false), (Verdict::Unexplained, 1));
+
+        // What makes blocks left out worse is no effect, however sure the criterion is of it.
+        let unless_worse = |with: f64| unless_refuted(with_errors(&named, 1.0, with, true)).verdict;
+        assert_eq!(unless_worse(1.01), Verdict::Named);
+        assert_eq!(unless_worse(1.05), Verdict::Unexplained);
 
         let run = |error: f64, adequate: bool| {
             let mut e = with_errors(&named, 1.0, 0.8, adequate);

@@ -26,6 +26,7 @@ mod plant_initial_states;
 mod plant_long;
 mod plant_neighbours;
 
+mod plant_pairs;
 mod plant_parameters;
 mod plant_parts;
 mod plant_search;

@@ -33,6 +33,8 @@ pub(crate) struct Found {
     pub(crate) plant: Plant,
     pub(crate) fit: Fit,
     pub(crate) accepted: usize,
+    /// Whether the first is no answer without the second: another effect alone is likelier.
+    pub(crate) is_pair: bool,
     /// What the recordings say about each hypothesis.
     pub(crate) trials: Vec<Trial>,
     pub(crate) options: EstimateOptions,
@@ -252,7 +254,7 @@ fn without_first(
 }
 
 /// Other first effects beside which a second is looked for, where the first leaves structure and nothing beside it explains that.
-const OTHER_FIRSTS: usize = 3;
+const OTHER_FIRSTS: usize = 4;
 
 /// What the equations leave out. The fit of the plant alone may be known.
 ///
@@ -279,22 +281,23 @@ pub(crate) fn search(
         return Ok(found);
     }
     // One term may do some of the work of two, each of which does less alone.
-    let mut families = vec![family(named(&plant.spec, first))];
-    let mut pairs: Vec<Found> = Vec::new();
+    let of_term = |f: &Fitted| named(&plant.spec, f);
+    let same = |f: &Fitted| family(of_term(f)) == family(of_term(first));
     let least = NEEDED.max(IMITATED * first.gain);
     let proven = |f: &Fitted| f.gain > least && f.hypothesis.is_none();
-    let of_term = |f: &Fitted| named(&plant.spec, f);
     let proven_ids = found.steps[0].iter().filter(|f| proven(f)).map(of_term);
     let special_cases: Vec<&str> = proven_ids.filter_map(special_case).collect();
+    let mut terms: Vec<&str> = Vec::new();
+    let mut pairs: Vec<Found> = Vec::new();
     for (i, other) in others.iter().enumerate() {
-        let id = of_term(other);
         // A special case may show what it gains only beside the second.
-        let as_special_case = special_cases.contains(&id) && other.hypothesis.is_none();
-        let as_other = proven(other) && id != "law" && families.len() <= OTHER_FIRSTS;
-        if !(as_special_case || as_other) || families.contains(&family(id)) {
+        let as_special_case = special_cases.contains(&of_term(other)) && other.hypothesis.is_none();
+        let as_other = proven(other) && of_term(other) != "law" && terms.len() < OTHER_FIRSTS;
+        let new = !same(other) && !terms.contains(&other.lead.term.id);
+        if !(new && (as_special_case || as_other)) {
             continue;
         }
-        families.push(family(id));
+        terms.push(other.lead.term.id);
         let mut fitted = [&[first.clone()], others].concat();
         fitted[..=i + 1].rotate_right(1);
         let step = Step {
@@ -308,9 +311,23 @@ pub(crate) fn search(
     let pairs = pairs
         .into_iter()
         .filter(|p| p.accepted > 1 && p.gain() > least);
-    Ok(pairs
-        .max_by(|a, b| a.gain().total_cmp(&b.gain()))
-        .unwrap_or(found))
+    let best = pairs.max_by(|a, b| a.gain().total_cmp(&b.gain()));
+    let estimator = match objective {
+        Objective::FreeRun => Estimator::FreeRun,
+        Objective::Likelihood => Estimator::Likelihood,
+    };
+    let errors = |of: &Found| held_out(&of.plant, &of.fit, estimator, recordings, hold);
+    let follows = |pair: &Found| {
+        let both = errors(pair).zip(errors(&found));
+        both.is_some_and(|(pair, single)| pair.over(&single) < 1.0)
+    };
+    match best.filter(follows) {
+        Some(pair) => Ok(Found {
+            is_pair: true,
+            ..pair
+        }),
+        None => Ok(found),
+    }
 }
 
 /// Forward selection, from the fit of the plant alone and the first step where these are known.
@@ -515,6 +532,7 @@ fn forward(
         plant: now,
         fit,
         accepted: accepted_so_far,
+        is_pair: false,
         trials: asked,
         options,
         information: 1.0,

@@ -362,6 +362,7 @@ fn rivals(found: &Found, search: usize, recordings: &[PlantRecording], hold: Hol
         }
         drop_refuted(&mut all, first);
     }
+    all.retain(|r| !(found.is_pair && r.accepted == 1));
     all
 }
 

@@ -244,6 +244,14 @@ impl<'a> Study<'a> {
         self.problem.recordings.iter().map(of).fold(0.0, f64::max)
     }
 
+    /// Of the first recording.
+    pub(crate) fn sample_time(&self) -> f64 {
+        self.problem
+            .recordings
+            .first()
+            .map_or(0.0, |r| r.sample_time)
+    }
+
     /// Number of free parameters.
     pub(crate) fn parameters(&self) -> usize {
         self.problem.free.len()

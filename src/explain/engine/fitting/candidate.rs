@@ -66,6 +66,8 @@ pub(crate) fn candidate(
         let name = free_name(spec, &format!("{}_{}", term.id, shape.symbol));
         let (min, max) = match shape.starts {
             Starts::Instants(_) => PlantRecording::span(recordings),
+            // What follows within a sample does not follow: it is a function.
+            Starts::Length(_) => (h, f64::INFINITY),
             Starts::Samples(_) if term.form.contains("delay") => (0.0, 100.0 * value + h),
             // Shorter times and narrower shapes are not told from none, and cost steps.
             Starts::Samples(_) if term.form.contains("{m}") => (LEAST_SAMPLES * h, f64::INFINITY),

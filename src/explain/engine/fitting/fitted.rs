@@ -5,7 +5,7 @@ use crate::explain::engine::hypothesis::prefer_asked;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::names::{SPECIFIC, name_rank, named, rank, special_case};
-use crate::explain::engine::terms::term::Starts;
+use crate::explain::engine::terms::term::{Needs, Starts};
 use crate::physics::ModelSpec;
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 
@@ -83,11 +83,16 @@ impl Fitted {
         }
     }
 
-    /// Whether the times of its term are within a recording of this length: what follows more slowly is a ramp there, or a constant.
-    pub(in crate::explain::engine) fn is_resolved(&self, length: f64) -> bool {
-        let mut times =
-            (self.lead.term.shapes.iter().zip(&self.shapes)).filter(|(s, _)| s.is_duration());
-        times.all(|(_, time)| *time <= length)
+    /// Whether the times of its term are within a recording of this length: what follows more slowly is a ramp there, or a constant. What
+    /// is slow by nature takes longer than a sample.
+    pub(in crate::explain::engine) fn is_resolved(&self, study: &Study) -> bool {
+        let (length, sample) = (study.duration(), study.sample_time());
+        let shapes = self.lead.term.shapes.iter().zip(&self.shapes);
+        let mut times = shapes.filter(|(s, _)| s.is_duration());
+        times.all(|(shape, time)| {
+            let slow = matches!(shape.starts, Starts::Length(_));
+            *time <= length && !(slow && *time <= sample)
+        })
     }
 
     /// The factor of a term whose size its shapes do not fix.
@@ -240,8 +245,10 @@ pub(in crate::explain::engine) fn order(spec: &ModelSpec, fitted: &mut [Fitted])
             false => f.gain,
         };
         fitted[..equals].sort_by(|a, b| {
-            // Of equals the one without a memory: more states follow more.
-            let key = |f: &Fitted| (rank(spec, f), f.candidate.new_states);
+            // Of equals the one that supposes nothing of the time before the recording, and the one without a memory: more states
+            // follow more.
+            let supposes = |f: &Fitted| f.lead.term.needs == Needs::SwitchedOn;
+            let key = |f: &Fitted| (supposes(f), rank(spec, f), f.candidate.new_states);
             (key(a).cmp(&key(b))).then(supported(b).total_cmp(&supported(a)))
         });
         prefer_special_case(spec, fitted);

@@ -11,7 +11,7 @@ use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::TERMS;
 use crate::explain::engine::terms::richer::richer;
 use crate::explain::engine::terms::term::{Needs, Port, Term, curve};
-use crate::explain::engine::terms::values::starts;
+use crate::explain::engine::terms::values::{grid, starts};
 use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH, limited};
 use crate::physics::estimate::{Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Unknown};
@@ -112,25 +112,40 @@ pub(in crate::explain::engine) fn also_elsewhere(
             return None;
         };
         let is_rate = matches!(spec.equations[at].unknown, Unknown::Derivative(_));
-        let is_joined = of.contains(&place.variable(spec))
-            || place.uses(spec, own)
-            || of.iter().any(|v| place.uses(spec, *v));
-        (at != here && is_rate && is_joined).then_some(at)
+        // What flows out of a store depends on what is in it.
+        let is_source = of.contains(&place.variable(spec)) || of.contains(&own);
+        (at != here && is_rate && is_source).then_some(at)
     });
+    // Of a difference also each variable alone.
+    let alone = |a: &usize| matches!(arguments[*a].variables[..], [one] if of.contains(&one) && of.len() > 1);
+    let serves = |a: &usize| arguments[*a].serves(lead.term.needs);
+    let singles = (0..arguments.len()).filter(alone).filter(serves);
+    let shapes_of = |a: usize| grid(lead.term, Some(&arguments[a]), ground.recordings, &[]);
+    let singles = singles.flat_map(|a| shapes_of(a).into_iter().map(move |shapes| (a, shapes)));
+    let functions: Vec<(usize, Vec<f64>)> = [(argument, fitted.shapes.clone())]
+        .into_iter()
+        .chain(singles)
+        .collect();
     let strength = fitted.strength();
     let starts = others.flat_map(|at| ARRIVES.map(|part| (at, -part * strength)));
-    let starts: Vec<(usize, f64)> = starts.collect();
-    let glanced = starts.into_par_iter().filter_map(|(at, there)| {
-        let mut lead = lead.clone();
-        lead.shapes.clone_from(&fitted.shapes);
-        (lead.strength, lead.arrives) = (strength, Some((at, there)));
-        let source = spec.equations[at].unknown.variable();
-        if of.contains(&source) && !of.contains(&own) {
-            lead.place = Place::Equation(at);
-            (lead.strength, lead.arrives) = (there, Some((here, strength)));
-        }
-        instead(fitted, lead, &glance, arguments, ground)
-    });
+    let starts = starts.flat_map(|start| functions.iter().map(move |of| (of, start)));
+    let starts: Vec<(&(usize, Vec<f64>), (usize, f64))> = starts.collect();
+    let glanced = starts
+        .into_par_iter()
+        .filter_map(|((argument, shapes), (at, there))| {
+            let argument = *argument;
+            let mut lead = lead.clone();
+            lead.shapes.clone_from(shapes);
+            lead.argument = Some(argument);
+            (lead.strength, lead.arrives) = (strength, Some((at, there)));
+            let source = spec.equations[at].unknown.variable();
+            let of = &arguments[argument].variables;
+            if of.contains(&source) && !of.contains(&own) {
+                lead.place = Place::Equation(at);
+                (lead.strength, lead.arrives) = (there, Some((here, strength)));
+            }
+            instead(fitted, lead, &glance, arguments, ground)
+        });
     clearly_better(fitted, glanced, ground)
 }
 
@@ -276,7 +291,7 @@ fn clearly_better(
         }
     }
     let thorough = forms.into_par_iter().filter_map(|f| thoroughly(f, ground));
-    let resolved = thorough.filter(|f| f.is_resolved(ground.study.duration()));
+    let resolved = thorough.filter(|f| f.is_resolved(ground.study));
     let better = resolved.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
     (better.gain > fitted.gain + TIE.0).then_some(better)
 }

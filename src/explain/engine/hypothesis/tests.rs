@@ -28,6 +28,23 @@ fn said(text: &str) -> String {
     read(text).expect_err(text).to_string()
 }
 
+/// Beside an effect that was found: the observer corrects none of the states that this has added.
+#[test]
+fn states_of_effects_stay_what_they_are() {
+    let mut with_effect = spec();
+    let state = with_effect.find("x").unwrap();
+    with_effect.variables[state.index()].uncorrected = true;
+    let hypothesis = read("a: u = c*u^2").unwrap();
+    let changed = hypothesis.candidate(&with_effect, &[1.0]).unwrap().plant;
+    let kept = |name: &str| {
+        changed
+            .spec
+            .variable(changed.spec.find(name).unwrap())
+            .uncorrected
+    };
+    assert!(kept("x") && !kept("v"));
+}
+
 #[test]
 fn a_term_enters_where_the_text_says() {
     for (text, expected) in [

@@ -176,7 +176,7 @@ pub(crate) fn screen(
             vec![None]
         } else {
             let serves = |a: &Argument| {
-                a.spread() > 0.0
+                (a.spread() > 0.0 || term.needs == Needs::SwitchedOn)
                     && (a.serves(term.needs)
                         || a.form == ArgumentForm::Product && term.id == "linear")
                     && (!term.remembers_way() || a.reverses())

@@ -97,7 +97,7 @@ pub(super) fn step(stage: &Stage) -> Step {
     let fitted = drop_repeated(candidates.fitted());
     let mut fitted = finished(fitted, study, fit, recordings, options);
     fitted.retain(|f| f.gain <= NEEDED || f.gain_without_few(study, fit, options) > NEEDED);
-    fitted.retain(|f| f.is_resolved(study.duration()));
+    fitted.retain(|f| f.is_resolved(study));
     // Values of the fit may make another name of a term.
     fitted.retain(|f| scope.allows(named(&plant.spec, f)));
     let mut starts = vec![fit];

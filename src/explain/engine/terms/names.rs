@@ -106,6 +106,11 @@ fn flows(unit: &str) -> bool {
     )
 }
 
+/// Whether a state with this unit is what flows, not what is stored: a current, a flow with inertia.
+fn is_current(unit: &str) -> bool {
+    matches!(unit, "A" | "mA") || unit.ends_with("/s")
+}
+
 /// Whether the square of a quantity with this unit may be a heat: a current, a voltage, or what has no unit.
 fn may_heat(unit: &str) -> bool {
     matches!(unit, "A" | "mA" | "V" | "mV" | "W" | "")
@@ -158,6 +163,14 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
             if may_be_velocity(spec, &variables) && slip < YIELDS * found.travel =>
         {
             "coulomb_friction"
+        }
+        // A wire that warms up conducts worse.
+        ("temperature_dependent_resistance", _)
+            if term.id == "parameter_heating"
+                && unit_of(spec, found.lead.place.variable(spec)) == "Ohm"
+                && found.strength() < 0.0 =>
+        {
+            "law"
         }
         // Dry friction is the same at every speed but the lowest.
         ("coulomb_friction" | "stribeck_friction", Some(&width)) if width > SATURATES * fastest => {
@@ -259,7 +272,7 @@ pub(crate) fn called(
     };
     let unit = |v: VariableId| unit_of(spec, v);
     let unit_of_place = unit(own);
-    let may_be_level = matches!(what, Kind::Other | Kind::Unknown);
+    let may_be_level = matches!(what, Kind::Other | Kind::Unknown) && !is_current(unit_of_place);
     match (term.port, term.id) {
         (Port::Sensor, id) => id,
         (Port::Input, "input_square" | "input_cube") => "input_curve",
@@ -296,7 +309,7 @@ pub(crate) fn called(
         (Port::Equation, "one_sided") if what == Kind::Velocity => "asymmetric_damping",
         (Port::Equation, "above" | "below" | "both_sides") => match what {
             Kind::Position => "end_stop",
-            Kind::Other | Kind::Unknown if *variables == [own] => "overflow",
+            _ if *variables == [own] && may_be_level => "overflow",
             _ => "law",
         },
         (Port::Equation, "root_above") if *variables == [own] && may_be_level => "overflow",
