@@ -298,7 +298,7 @@ pub(crate) fn search(
             continue;
         }
         terms.push(other.lead.term.id);
-        let mut fitted = [&[first.clone()], others].concat();
+        let mut fitted = [std::slice::from_ref(first), others].concat();
         fitted[..=i + 1].rotate_right(1);
         let step = Step {
             fitted,

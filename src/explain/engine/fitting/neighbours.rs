@@ -127,25 +127,26 @@ pub(in crate::explain::engine) fn also_elsewhere(
         .chain(singles)
         .collect();
     let strength = fitted.strength();
-    let starts = others.flat_map(|at| ARRIVES.map(|part| (at, -part * strength)));
-    let starts = starts.flat_map(|start| functions.iter().map(move |of| (of, start)));
-    let starts: Vec<(&(usize, Vec<f64>), (usize, f64))> = starts.collect();
-    let glanced = starts
-        .into_par_iter()
-        .filter_map(|((argument, shapes), (at, there))| {
-            let argument = *argument;
-            let mut lead = lead.clone();
-            lead.shapes.clone_from(shapes);
-            lead.argument = Some(argument);
-            (lead.strength, lead.arrives) = (strength, Some((at, there)));
-            let source = spec.equations[at].unknown.variable();
-            let of = &arguments[argument].variables;
-            if of.contains(&source) && !of.contains(&own) {
-                lead.place = Place::Equation(at);
-                (lead.strength, lead.arrives) = (there, Some((here, strength)));
+    let mut leads: Vec<Lead> = Vec::new();
+    for at in others {
+        let source = spec.equations[at].unknown.variable();
+        for (argument, shapes) in &functions {
+            let of = &arguments[*argument].variables;
+            let leaves_there = of.contains(&source) && !of.contains(&own);
+            for there in ARRIVES.map(|part| -part * strength) {
+                let both = match leaves_there {
+                    true => [(at, there), (here, strength)],
+                    false => [(here, strength), (at, there)],
+                };
+                let mut new =
+                    (lead.clone()).at(Place::Equation(both[0].0), Some(*argument), shapes);
+                (new.strength, new.arrives) = (both[0].1, Some(both[1]));
+                leads.push(new);
             }
-            instead(fitted, lead, &glance, arguments, ground)
-        });
+        }
+    }
+    let glanced =
+        (leads.into_par_iter()).filter_map(|new| instead(fitted, new, &glance, arguments, ground));
     clearly_better(fitted, glanced, ground)
 }
 
