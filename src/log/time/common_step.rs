@@ -10,14 +10,11 @@ const ROUNDING: f64 = 1e-4;
 /// Points to the shortest spacing where times have no common divisor: none is further from its point than a twentieth of it; or to the
 /// median, where a few times are much closer than the others.
 const POINTS_A_SPACING: f64 = 10.0;
-/// Part of the spacings, at most, that are those of events: a logger writes a row more when something is switched.
-const EVENTS: f64 = 0.05;
 /// Distance of a time from its point on such a grid, at most, in shortest spacings.
 pub(crate) const NEAR: f64 = 0.5 / POINTS_A_SPACING;
 
 /// The greatest common divisor of the spacings of these times in seconds, or a tenth of the shortest where that needs too many
-/// points, or the shortest where it is a tenth of most, or a tenth of the median where few are shorter than that; none where all need too
-/// many. Times that go back begin another recording.
+/// points, or the shortest where it is a tenth of most; none where all need too many. Times that go back begin another recording.
 pub(crate) fn common_step(times: &[f64]) -> Option<f64> {
     let known: Vec<f64> = times.iter().copied().filter(|t| t.is_finite()).collect();
     let spacings: Vec<f64> = known
@@ -33,13 +30,10 @@ pub(crate) fn common_step(times: &[f64]) -> Option<f64> {
     let divisor = spacings.iter().fold(0.0, common);
     let mut sorted = spacings;
     sorted.sort_by(f64::total_cmp);
-    let of_usual = sorted[sorted.len() / 2] / POINTS_A_SPACING;
-    let few_are_close = shortest <= of_usual;
-    let events = sorted[(EVENTS * sorted.len() as f64) as usize] > of_usual;
+    let few_are_close = shortest <= sorted[sorted.len() / 2] / POINTS_A_SPACING;
     [divisor, shortest / POINTS_A_SPACING]
         .into_iter()
         .chain(few_are_close.then_some(shortest))
-        .chain(events.then_some(of_usual))
         .find(|step| *step >= finest)
 }
 
