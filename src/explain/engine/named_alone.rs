@@ -73,6 +73,7 @@ pub(super) fn named_alone(
         plant,
         fit,
         accepted: 1,
+        is_pair: false,
         held_out: Some([without.clone(), with]),
         ..found.clone()
     })

@@ -498,6 +498,7 @@ fn forward(
             )
         {
             may_drop = false;
+            on_trial &= alone.gain <= NEEDED;
             options.free.truncate(plant.spec.parameters().len());
             options = with_more(&options, alone.candidate.values.len());
             (now, fit) = (alone.candidate.plant.clone(), alone.fit.clone());

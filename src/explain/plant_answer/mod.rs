@@ -41,6 +41,7 @@ use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitTable, JointTest,
     OutputFit, ParameterChange, Remaining, Verdict,
 };
+use crate::explain::engine::fitting::edit::driven_state;
 use crate::identify::Recording;
 use crate::log::{Channel, Log};
 use crate::physics::estimate::{
@@ -295,8 +296,8 @@ impl Answer<'_> {
         let later = self.effects().any(in_time);
         let doubted = self.effects().any(|fitted| self.doubt(fitted).is_some());
         let safe = self.effects().enumerate().all(|(i, fitted)| {
-            let law = self.law(fitted);
-            law.is_none_or(|law| is_safe(fitted, &law, self.spec_before(i)))
+            let state = driven_state(self.spec_before(i), fitted.lead.place);
+            self.law(fitted).is_none_or(|law| is_safe(&law, state))
         });
         let relied_on = verdict != Verdict::Unexplained
             || effects.is_empty()

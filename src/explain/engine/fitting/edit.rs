@@ -60,6 +60,16 @@ impl Place {
     }
 }
 
+/// The state whose rate is at a place.
+pub(crate) fn driven_state(spec: &ModelSpec, place: Place) -> Option<&str> {
+    let v = place.variable(spec);
+    let Place::Equation(at) = place else {
+        return None;
+    };
+    let is_rate = spec.equations[at].unknown == Unknown::Derivative(v);
+    is_rate.then_some(spec.variable(v).name.as_str())
+}
+
 /// A parameter that a change brings along.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct NewParameter {

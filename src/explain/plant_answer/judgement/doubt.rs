@@ -1,10 +1,9 @@
 //! Why an effect that the criterion is sure of is not named: the recording does not tell it from something else.
 
-use crate::explain::engine::fitting::edit::Place;
 use crate::explain::engine::fitting::fitted::Fitted;
 use crate::explain::explanation::Law;
+use crate::physics::ModelSpec;
 use crate::physics::estimate::PlantRecording;
-use crate::physics::{ModelSpec, Unknown};
 
 /// A change of an input from one sample to the next by this part of its range is a step.
 const STEP: f64 = 0.25;
@@ -56,23 +55,16 @@ pub(in crate::explain::plant_answer) fn doubt(
     ))
 }
 
-/// Whether an unproven law may predict: it is known better than its size is throughout its range, and does not grow with the state that
-/// it drives. Beyond its range such a law carries the state away.
-pub(in crate::explain::plant_answer) fn is_safe(
-    fitted: &Fitted,
-    law: &Law,
-    spec: &ModelSpec,
-) -> bool {
+/// Whether an unproven law may predict: it is known better than its size is throughout its range, and does not grow with the state whose
+/// rate it enters. Beyond its range such a law carries the state away.
+pub(in crate::explain::plant_answer) fn is_safe(law: &Law, state: Option<&str>) -> bool {
     let largest = law.value.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     let known = law.std.iter().all(|std| *std < largest);
-    let own = fitted.lead.place.variable(spec);
-    let drives_own = matches!(fitted.lead.place, Place::Equation(at) if spec.equations[at].unknown == Unknown::Derivative(own))
-        && law.variable.trim_start_matches('(').split(' ').next()
-            == Some(spec.variable(own).name.as_str());
+    let first = law.variable.trim_start_matches('(').split(' ').next();
     let grows = |pair: Option<&[f64]>| pair.is_some_and(|v| v[1] > v[0]);
     let mut steps = law.value.windows(2);
-    let (first, last) = (steps.next(), steps.next_back());
-    known && !(drives_own && (grows(first) || grows(last)))
+    let (low, high) = (steps.next(), steps.next_back());
+    known && !(state.is_some() && state == first && (grows(low) || grows(high)))
 }
 
 /// The input that steps at an instant, where its steps are so few that this is no chance.
@@ -121,6 +113,24 @@ mod tests {
             sample_time: 0.1,
             start_time: 5.0,
         }
+    }
+
+    #[test]
+    fn a_law_that_carries_its_state_away_does_not_predict() {
+        let law = |variable: &str, value: [f64; 3], std: f64| Law {
+            variable: variable.to_owned(),
+            at: vec![0.0, 1.0, 2.0],
+            value: value.to_vec(),
+            std: vec![0.1, std, 0.1],
+        };
+        assert!(is_safe(&law("T", [0.0, -1.0, -3.0], 0.1), Some("T")));
+        assert!(!is_safe(&law("T", [0.0, 1.0, 3.0], 0.1), Some("T")));
+        assert!(!is_safe(&law("(T - Ta)", [0.0, 1.0, 3.0], 0.1), Some("T")));
+        // It drives another state, or none.
+        assert!(is_safe(&law("T", [0.0, 1.0, 3.0], 0.1), Some("x")));
+        assert!(is_safe(&law("T", [0.0, 1.0, 3.0], 0.1), None));
+        // Somewhere nothing is known.
+        assert!(!is_safe(&law("T", [0.0, -1.0, -3.0], 3.0), Some("T")));
     }
 
     #[test]
