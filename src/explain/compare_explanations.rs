@@ -11,6 +11,9 @@ const MOST_INSIDE: f64 = 0.75;
 /// Runs whose errors differ by less than this part are equally good (the tolerance of the project's score on real recordings).
 const EQUAL: f64 = 0.02;
 
+/// A free run with at least this fit (in percent) follows the recording: it leaves 1 % of the variance.
+const FOLLOWS: f64 = 90.0;
+
 /// The part of the mean square of the error in blocks left out that the answer takes off what the simulation leaves, as it is given
 /// or with other parameters.
 fn removed(explanation: &Explanation) -> f64 {
@@ -152,6 +155,60 @@ pub(crate) fn stands_in(equations: &Explanation, doubtful: &Explanation) -> bool
         false => (1.0 - MOST).sqrt(),
     };
     error_over(equations, doubtful).is_some_and(|error| error <= most)
+}
+
+/// Static laws inside a plant, which a plant of another class may have by its nature.
+const CURVES: [&str; 5] = [
+    "law",
+    "cubic_stiffness",
+    "quadratic_stiffness",
+    "end_stop",
+    "stiffness_change",
+];
+
+fn is_curve(explanation: &Explanation) -> bool {
+    let mut effects = explanation.effects.iter();
+    effects.any(|e| CURVES.contains(&e.effect.as_str()))
+}
+
+fn is_drive(explanation: &Explanation) -> bool {
+    let model = explanation.model.as_ref();
+    model.is_some_and(|model| model.mechanics.is_some())
+}
+
+/// Whether the run with what was found follows the recording, and nothing is left beside it.
+pub(crate) fn follows(explanation: &Explanation) -> bool {
+    explanation.verdict != Verdict::Unexplained
+        && explanation.remaining.adequate
+        && explanation.fit.train.augmented.fit_percent >= FOLLOWS
+}
+
+/// Whether another plant may explain more than a linear explanation, which names nothing surely, or leaves structure or much of the
+/// output (a noise model with a slow root takes what a wrong plant leaves for noise), or names a curve.
+pub(crate) fn leaves_room(linear: &Explanation) -> bool {
+    match linear.verdict {
+        Verdict::Consistent | Verdict::Parameters => false,
+        Verdict::Unexplained => true,
+        // The averaged equation of motion is of a drive already.
+        Verdict::Named | Verdict::Family if is_drive(linear) => false,
+        Verdict::Named | Verdict::Family => !follows(linear) || is_curve(linear),
+    }
+}
+
+/// Whether an explanation by another plant stands in the place of a linear one: of one without a name as equations do ([`stands_in`]),
+/// of one with a name where it has one too and its run is clearly closer, or as close where its class has the curve from the start,
+/// which the linear one fits with more numbers.
+pub(crate) fn supersedes(other: &Explanation, linear: &Explanation) -> bool {
+    if linear.verdict == Verdict::Unexplained {
+        return stands_in(other, linear);
+    }
+    let simpler = other.effects.len() <= linear.effects.len();
+    let most = match is_curve(linear) && simpler && other.remaining.adequate {
+        true => 1.0 + EQUAL,
+        false => (1.0 - MOST).sqrt(),
+    };
+    matches!(other.verdict, Verdict::Named | Verdict::Family)
+        && error_over(other, linear).is_some_and(|error| error <= most)
 }
 
 /// Whether two explanations name the same effects. They were found in different ways, so that each confirms the other.

@@ -2,10 +2,12 @@
 
 use super::columns;
 use super::compare_explanations::{
-    agree, doubt, is_doubtful, is_sure, replaces, stands_in, unless_refuted,
+    agree, doubt, follows, is_doubtful, is_sure, leaves_room, replaces, stands_in, supersedes,
+    unless_refuted,
 };
 use super::document::explain_error::ExplainError;
 use super::effects::{self, Definition};
+use super::engine::terms::documentation::plant_effect;
 use super::explanation::{Explanation, Verdict};
 use super::linear::answer::linear_answer::Answer;
 use super::linear::answer::probability::is_unlikely;
@@ -19,6 +21,7 @@ use super::linear::nonlinear_simulator::NonlinearSimulator;
 use super::linear::screening::output_adequacy::LEVEL;
 use super::memory;
 use super::simulation::Simulation;
+use super::structures::explain_structure;
 use crate::log::Log;
 use crate::noise::{Mask, effective_samples};
 
@@ -51,7 +54,7 @@ pub fn explain(
     options: &Options,
 ) -> Result<Explanation, ExplainError> {
     for id in &options.without {
-        if effects::library().all(|d| d.id != id) {
+        if effects::library().all(|d| d.id != id) && plant_effect(id).is_none() {
             return Err(ExplainError::UnknownEffect { id: id.clone() });
         }
     }
@@ -71,7 +74,14 @@ pub fn explain(
     let allowed = |d: &Definition| allowed_id(d.id) && d.unit_of_output().is_none_or(measured);
     // The data before the physics: from here on they are as repaired.
     let checked = Checked::new(recordings, simulation, &allowed_id);
-    match know(&checked)? {
+    let simulator = match know(&checked) {
+        Err(unstable @ ExplainError::Unstable { .. }) => {
+            let structure = explain_structure(&checked, &options.without, None);
+            return structure.filter(follows).ok_or(unstable);
+        }
+        simulator => simulator?,
+    };
+    match simulator {
         Simulator::Linear(known) => {
             let explanation = explain_linear(*known, &checked, &allowed, options.seed)?;
             let explanation = unless_refuted(explanation);
@@ -130,21 +140,31 @@ fn explain_linear(
     Ok(said(&known, checked, (finding, mask), seed))
 }
 
-/// An answer that is not sure is compared with that of the equations that reproduce the simulated outputs.
+/// An answer that is not sure is compared with that of the equations that reproduce the simulated outputs, and one that leaves
+/// structure with that of another plant.
 fn second_opinion(explanation: Explanation, checked: &Checked, options: &Options) -> Explanation {
     let mut outputs = checked.recordings.iter().flat_map(|r| &r.outputs);
     let has_units = outputs.all(|o| o.unit.is_some());
-    if !checked.troubles.is_empty() || is_sure(&explanation, has_units) {
+    if !checked.troubles.is_empty() {
         return explanation;
     }
-    let by_equations = || {
-        let equations = columns::equations(checked)?;
-        if equations.misfit > columns::REPRODUCED {
-            return None;
+    if !is_sure(&explanation, has_units) {
+        let by_equations = || {
+            let equations = columns::equations(checked)?;
+            if equations.misfit > columns::REPRODUCED {
+                return None;
+            }
+            columns::explain_equations(&equations, checked, &options.without)
+        };
+        if let Some(other) = by_equations().filter(|other| replaces(other, &explanation)) {
+            return other;
         }
-        columns::explain_equations(&equations, checked, &options.without)
-    };
-    let other = by_equations().filter(|other| replaces(other, &explanation));
+    }
+    if !leaves_room(&explanation) {
+        return explanation;
+    }
+    let other = explain_structure(checked, &options.without, Some(&explanation));
+    let other = other.filter(|other| supersedes(other, &explanation));
     other.unwrap_or(explanation)
 }
 

@@ -420,17 +420,6 @@ pub struct ModelEffect {
     pub coefficients: Vec<f64>,
 }
 
-/// Distribution of the state over the recordings.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct StatePrior {
-    /// Mean.
-    pub mean: Vec<f64>,
-    /// Covariance.
-    pub covariance: Rows,
-    /// Root mean square of what the model missed of the output, in its unit.
-    pub error_std: f64,
-}
-
 /// A plant with effects: `x+ = A x + B u_eff + sum b_i f_i`, `y = sensor(C x + D u_eff)`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AugmentedModel {
@@ -463,10 +452,6 @@ pub struct AugmentedModel {
     /// Steps of the recursion in a sample interval.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub substeps: usize,
-    /// What is known of the state before a recording is seen, where that matters. The state of tanks is their levels
-    /// (the recorded one last), and `A`, `B`, `C`, `D` are what the tanks do near their mean levels.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub initial_state_prior: Option<StatePrior>,
     /// The same plant as an equation of motion, where it is a mass that the input moves.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mechanics: Option<Mechanics>,

@@ -19,8 +19,9 @@
 //! | `linear` | the linear engine: from the checks of the data to the answer |
 //! | `engine` | the engine for plants in equations: terms at places of the equations |
 //! | `plant_answer` | the question about a plant in equations, and its answer |
+//! | `structures` | other plants in equations, offered where a linear simulation leaves structure |
 //! | `columns` | equations that reproduce columns of outputs, for the engine of plants in equations |
-//! | `compare_explanations` | the choice between the answers of both engines, for columns |
+//! | `compare_explanations` | the choice between the answers of both engines |
 //! | `explanation` | the explanation as a document (`innovant-explanation/1`): its types |
 //! | `document` | its sentences, plots, units and errors |
 
@@ -35,6 +36,7 @@ mod linear;
 mod memory;
 mod plant_answer;
 mod simulation;
+mod structures;
 
 pub use document::explain_error::ExplainError;
 pub use engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
@@ -46,7 +48,7 @@ pub use explanation::{
     EffectFound, EffectSize, EquationMap, Evidence, Explanation, FitFigure, FitSteps, FitTable,
     HypothesisFit, HypothesisFound, HypothesisRival, HypothesisVerdict, JointTest, Law, Location,
     Mechanics, ModelEffect, NoiseFound, OutputFit, ParameterChange, Quantity, Regime, Remaining,
-    SignalReference, SignalTraces, StatePrior, Verdict,
+    SignalReference, SignalTraces, Verdict,
 };
 pub use linear::augmented::simulate_augmented::AugmentedError;
 pub use plant_answer::{

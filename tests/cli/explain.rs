@@ -595,17 +595,6 @@ fn damaged_explanations() {
         }]);
     });
     says(&unknown, &["damaged.json", "`phlogiston`", "does not know"]);
-    // The class of tanks has one output, and as many levels as tanks: this model has three states.
-    let tanks = whole.spoilt(|d| {
-        d["model"]["effects"] = serde_json::json!([{
-            "effect": "tank_outflow", "variant": "two tanks", "channel": 0, "looks_at": {"output": 0},
-            "parameters": [1.0, 1.0, 1.0], "coefficients": [],
-        }]);
-    });
-    says(
-        &tanks,
-        &["damaged.json", "one or two levels and one output"],
-    );
     let text = whole.document.to_string();
     let half = text[..text.len() / 2].rfind(',').unwrap();
     says(&whole.about(&text[..=half]), &["damaged.json", "not whole"]);

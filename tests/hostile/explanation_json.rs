@@ -104,7 +104,7 @@ fn dressed(document: &mut Value, bytes: &mut Bytes) {
         .get("outputs")
         .and_then(Value::as_array)
         .map_or(0, Vec::len);
-    match bytes.below(6) {
+    match bytes.below(5) {
         0..=2 => {
             let entries: Vec<_> = library().collect();
             let entry = entries[bytes.below(entries.len())];
@@ -146,20 +146,6 @@ fn dressed(document: &mut Value, bytes: &mut Bytes) {
             }
         }
         3 => {
-            let covariance: Vec<Vec<f64>> = (0..states)
-                .map(|i| {
-                    (0..states)
-                        .map(|j| if i == j { bytes.finite() } else { 0.0 })
-                        .collect()
-                })
-                .collect();
-            let mean: Vec<f64> = (0..states).map(|_| bytes.finite()).collect();
-            model.insert(
-                "initial_state_prior".to_owned(),
-                json!({"mean": mean, "covariance": covariance, "error_std": bytes.finite()}),
-            );
-        }
-        4 => {
             let quantity = json!({"value": bytes.finite(), "std": null, "unit": ""});
             model.insert(
                 "mechanics".to_owned(),

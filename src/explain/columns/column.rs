@@ -4,19 +4,19 @@ use crate::log::Channel;
 use crate::physics::{function_names, is_reserved};
 
 /// A column as the text names it.
-pub(super) struct Column(pub(super) Channel);
+pub(crate) struct Column(pub(crate) Channel);
 
 /// Names of the states that follow an output.
 const STATES: [&str; 2] = ["_state", "_rate"];
 
 impl Column {
-    pub(super) fn unit(&self) -> String {
+    pub(crate) fn unit(&self) -> String {
         let unit = self.0.unit.as_ref().filter(|u| !u.contains(['"', '\\']));
         unit.map_or_else(String::new, |u| format!("(unit=\"{u}\")"))
     }
 
     /// What follows the start value in the declaration of a state. The rate of a position is a velocity.
-    pub(super) fn unit_of_state(&self, place: usize) -> String {
+    pub(crate) fn unit_of_state(&self, place: usize) -> String {
         let unit = match (self.0.unit.as_deref(), place) {
             (Some(unit), 0) if !unit.contains(['"', '\\']) => unit,
             (Some("m"), 1) => "m/s",
@@ -26,12 +26,12 @@ impl Column {
         format!(", unit=\"{unit}\"")
     }
 
-    pub(super) fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         self.suffixed("")
     }
 
     /// Quoted where it is no plain name.
-    pub(super) fn suffixed(&self, suffix: &str) -> String {
+    pub(crate) fn suffixed(&self, suffix: &str) -> String {
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
         let begins = self
             .0
@@ -49,7 +49,7 @@ impl Column {
         }
     }
 
-    pub(super) fn state(&self, place: usize) -> String {
+    pub(crate) fn state(&self, place: usize) -> String {
         match STATES.get(place) {
             Some(suffix) => self.suffixed(suffix),
             None => self.suffixed(&format!("{}{place}", STATES[1])),

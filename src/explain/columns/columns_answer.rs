@@ -137,7 +137,7 @@ impl Reproduced {
 }
 
 /// Logs, and how a document refers to them.
-pub(super) fn logs_with_recordings(logs: impl Iterator<Item = Log>) -> (Vec<Log>, Vec<Recording>) {
+pub(crate) fn logs_with_recordings(logs: impl Iterator<Item = Log>) -> (Vec<Log>, Vec<Recording>) {
     logs.map(|log| {
         let recording = Recording::of_log(&log, None);
         (log, recording)

@@ -17,14 +17,14 @@ mod filtered_signals;
 mod regression;
 mod simulator_outputs;
 
-pub(crate) use columns_answer::{doubt_rough, equations, explain_equations};
+pub(crate) use column::Column;
+pub(crate) use columns_answer::{doubt_rough, equations, explain_equations, logs_with_recordings};
 pub(crate) use simulator_outputs::explain_sensors;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use self::chain::Chains;
-use self::column::Column;
 use self::drop_coefficients::eliminate;
 use self::filtered_signals::{Regressors, Signals};
 use self::regression::{OutputEquation, output_equation};

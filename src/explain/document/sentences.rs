@@ -20,11 +20,6 @@ pub(crate) fn unit_text(unit: Unit, input: &Channel, output: &Channel, integral:
         Unit::Position => per(of(output), ""),
         Unit::Rate if integral => per(of(output), ""),
         Unit::Rate => per(of(output), "/s"),
-        Unit::RatePerInput => match (of(output), of(input)) {
-            (Some(y), Some(u)) => format!("{y}/({u} s)"),
-            _ => String::new(),
-        },
-        Unit::RootRate => of(output).map_or_else(String::new, |y| format!("sqrt({y})/s")),
         Unit::Second => "s".to_owned(),
         Unit::Hertz => "Hz".to_owned(),
         Unit::Radian => "rad".to_owned(),
@@ -98,7 +93,6 @@ pub(crate) fn place(definition: &Definition, signal: &str) -> String {
         Port::Force => format!("inside the plant, seen at {signal}"),
         Port::Sensor | Port::Exact => format!("at the sensor of {signal}"),
         Port::Path => format!("on the way from {signal}"),
-        Port::Process => format!("seen at {signal}"),
     }
 }
 

@@ -11,7 +11,6 @@ mod disturbance;
 mod flow;
 mod friction;
 mod law;
-mod process;
 mod sensor;
 mod stiffness;
 #[cfg(test)]
@@ -31,8 +30,6 @@ pub enum Port {
     Sensor,
     /// Another dynamic path from the inputs to an output, beside the plant.
     Path,
-    /// The plant itself, which is of another class.
-    Process,
     /// Changes what the recording is, sample by sample; found by exact tests, not by fits.
     Exact,
 }
@@ -50,10 +47,6 @@ pub enum Unit {
     Position,
     /// That unit per second.
     Rate,
-    /// That unit per second, over the unit of the input channel.
-    RatePerInput,
-    /// The square root of that unit, per second.
-    RootRate,
     /// Seconds.
     Second,
     /// Hertz.
@@ -181,8 +174,6 @@ pub(crate) enum Action {
     MissingPath,
     /// A curve of the integral of an input, added to the outputs.
     Charge,
-    /// Part of a plant of another class, which is run in place of the linear one (`tank_simulation`).
-    Process,
     /// Found by an exact test; in the model it is a sensor law without effect on fits.
     Exact,
 }
@@ -205,7 +196,6 @@ impl std::fmt::Debug for Action {
             Self::Sine => "Sine",
             Self::MissingPath => "MissingPath",
             Self::Charge => "Charge",
-            Self::Process => "Process",
             Self::Exact => "Exact",
         })
     }
@@ -283,7 +273,6 @@ impl Definition {
             Action::Force(..) | Action::Linear(_) => Port::Force,
             Action::Sensor(_) | Action::Sine => Port::Sensor,
             Action::Mode | Action::MissingPath | Action::Charge => Port::Path,
-            Action::Process => Port::Process,
             Action::Exact => Port::Exact,
         }
     }
@@ -300,7 +289,6 @@ pub fn library() -> impl Iterator<Item = &'static Definition> {
         sensor::ENTRIES,
         disturbance::ENTRIES,
         change::ENTRIES,
-        process::ENTRIES,
     ]
     .into_iter()
     .flatten()

@@ -6,7 +6,6 @@
 //! | folder or file | what it holds |
 //! |---|---|
 //! | `data`, `effective_samples` | recordings as segments of samples; the number of independent values in a correlated series |
-//! | `cascade` | two tanks in cascade: their simulation and their fit |
 //! | `model` | the augmented model: linear plant, coordinates, effects, simulation |
 //! | `fit` | maximum likelihood by Levenberg and Marquardt; covariance, profile likelihood |
 //! | `identification` | a linear model from columns of simulated outputs; output-error models |
@@ -23,7 +22,6 @@
 
 pub(crate) mod answer;
 pub(crate) mod augmented;
-pub(crate) mod cascade;
 pub(crate) mod check;
 pub(crate) mod data;
 pub(crate) mod decision;

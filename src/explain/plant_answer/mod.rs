@@ -13,6 +13,8 @@ mod simulate_explained;
 mod where_to_look;
 mod within_bounds;
 
+pub(crate) use plant_effects::spoken;
+pub(crate) use question::Origin;
 pub use question::{PlantOptions, PlantQuestionError};
 pub use simulate_explained::{AugmentedPlantError, Original};
 
@@ -64,6 +66,17 @@ pub fn explain_plant(
     known: Vec<Recording>,
     options: &PlantOptions,
 ) -> Result<Explanation, PlantQuestionError> {
+    explain_equations(plant, logs, known, options, Origin::Text)
+}
+
+/// The same of equations from anywhere.
+pub(crate) fn explain_equations(
+    plant: &Plant,
+    logs: &[Log],
+    known: Vec<Recording>,
+    options: &PlantOptions,
+    origin: Origin,
+) -> Result<Explanation, PlantQuestionError> {
     let scope = Scope {
         hypotheses: distinct(&options.hypotheses)?,
         ..Scope::new(&options.only, &options.without)?
@@ -98,6 +111,7 @@ pub fn explain_plant(
         covariance,
         whole,
         hold,
+        origin,
         found: &found,
         hypotheses: &scope.hypotheses,
         units: units_in_words(&found.plant.spec),
@@ -115,6 +129,7 @@ struct Answer<'a> {
     base: Study<'a>,
     whole: Study<'a>,
     hold: Hold,
+    origin: Origin,
     found: &'a Found,
     hypotheses: &'a [Hypothesis],
     inputs: Vec<Channel>,
@@ -472,7 +487,7 @@ impl Answer<'_> {
         self.effects().flat_map(of).collect()
     }
 
-    /// Parameters of the text that the recording contradicts, estimated beside what was found.
+    /// Parameters of the text that the recording contradicts, or all of a structure, estimated beside what was found.
     fn parameters(&self) -> Vec<ParameterChange> {
         let covariance = &self.covariance;
         let nominal = self.plant.nominal().parameters;
@@ -482,11 +497,11 @@ impl Answer<'_> {
             let (value, std) = (self.found.fit.point[i], covariance[(i, i)].max(0.0).sqrt());
             let differs = std.is_finite() && (value - nominal[i]).abs() > DIFFERENT * std;
             let variable = spec.variable(v);
-            differs.then(|| ParameterChange {
+            (differs || self.origin == Origin::Structure).then(|| ParameterChange {
                 name: variable.column().to_owned(),
                 simulation: nominal[i],
                 recording: value,
-                std: Some(std),
+                std: std.is_finite().then_some(std),
                 unit: variable.unit_text.clone().unwrap_or_default(),
             })
         })

@@ -445,7 +445,7 @@ fn curve_in_numbers(argument: &str, points: &[(f64, &Quantity)]) -> Option<Strin
 }
 
 /// The id in words, as a sentence begins with it.
-fn spoken(id: &str) -> String {
+pub(crate) fn spoken(id: &str) -> String {
     if id == "law" {
         return "An unlisted function".to_owned();
     }

@@ -1,16 +1,17 @@
 //! The answer in sentences.
 
-use super::Answer;
 use super::judgement::free_run::{Astray, STRAYS, leaves_half};
 use super::where_to_look::places;
 use super::within_bounds::at_bounds;
+use super::{Answer, Origin};
 use crate::explain::document::sentences::{number, p_value, quantity};
 use crate::explain::engine::fitting::edit::{is_shared_term, users_of};
 use crate::explain::engine::fitting::fitted::{Fitted, TIE};
 use crate::explain::engine::select::CHANCE;
 use crate::explain::engine::thresholds::{LEFT, NEEDED, SURE};
 use crate::explain::explanation::{
-    Alternative, EffectFound, FitSteps, JointTest, OutputFit, ParameterChange, Quantity, Verdict,
+    Alternative, EffectFound, FitFigure, FitSteps, JointTest, OutputFit, ParameterChange, Quantity,
+    Verdict,
 };
 use crate::physics::estimate::{EstimateError, PlantRecording};
 use crate::physics::{Equation, VariableId};
@@ -127,7 +128,7 @@ impl Answer<'_> {
             }
         }
         lines.extend(self.shared_terms(told.effects));
-        lines.extend(changes(told.parameters));
+        lines.extend(changes(told.parameters, self.origin));
         lines.extend(bounds_in_words(&bounds.determined, told));
         lines.extend((!bounds.undetermined.is_empty()).then(|| {
             format!(
@@ -139,7 +140,7 @@ impl Answer<'_> {
         if with_effects {
             lines.extend(held_out(told.outputs));
         }
-        lines.push(free_runs(told.outputs, with_effects));
+        lines.push(free_runs(told.outputs, with_effects, self.origin));
         lines.extend(self.found.part.map(|part| {
             let all: usize = self.recordings.iter().map(PlantRecording::samples).sum();
             let which = match part.every {
@@ -286,8 +287,8 @@ fn closest(effect: &EffectFound) -> String {
     )
 }
 
-/// Parameters that differ from the text.
-fn changes(parameters: &[ParameterChange]) -> Option<String> {
+/// Parameters that differ from the text, or all of a structure.
+fn changes(parameters: &[ParameterChange], origin: Origin) -> Option<String> {
     let each: Vec<String> = parameters
         .iter()
         .map(|p| {
@@ -296,12 +297,18 @@ fn changes(parameters: &[ParameterChange]) -> Option<String> {
                 std: p.std,
                 unit: p.unit.clone(),
             };
-            let (name, text) = (&p.name, number(p.simulation));
-            format!("{name} {text} -> {}", quantity(&recorded))
+            let (name, now) = (&p.name, quantity(&recorded));
+            match origin {
+                Origin::Text => format!("{name} {} -> {now}", number(p.simulation)),
+                Origin::Structure => format!("{name} = {now}"),
+            }
         })
         .collect();
-    (!each.is_empty())
-        .then(|| format!("Parameters that differ from the text: {}.", each.join("; ")))
+    let which = match origin {
+        Origin::Text => "Parameters that differ from the text",
+        Origin::Structure => "Parameters of the equations",
+    };
+    (!each.is_empty()).then(|| format!("{which}: {}.", each.join("; ")))
 }
 
 /// Whether the parameters of the text fit as well as the estimates.
@@ -334,7 +341,7 @@ fn held_out(outputs: &[OutputFit]) -> Option<String> {
     let said = listed(
         outputs,
         &all.filter(|all| !all.is_empty())?,
-        ["without it", "with it"],
+        &["without it", "with it"],
     );
     Some(format!(
         "Fitted without a third of the recording, and run freely over it: {said}."
@@ -342,20 +349,20 @@ fn held_out(outputs: &[OutputFit]) -> Option<String> {
 }
 
 /// Free runs of all outputs.
-fn free_runs(outputs: &[OutputFit], with_effects: bool) -> String {
-    let text = "with the values of the text";
-    let only = "with estimated parameters and initial states";
-    let fits = |o: &OutputFit| {
-        let t: &FitSteps = &o.train;
-        [t.simulation, t.parameters_only, t.augmented].map(|f| f.fit_percent)
-    };
-    let all: Vec<[f64; 3]> = outputs.iter().map(fits).collect();
-    let said = if with_effects {
-        listed(outputs, &all, [text, only, "with what was found"])
-    } else {
-        let two: Vec<[f64; 2]> = all.iter().map(|[a, b, _]| [*a, *b]).collect();
-        listed(outputs, &two, [text, only])
-    };
+fn free_runs(outputs: &[OutputFit], with_effects: bool, origin: Origin) -> String {
+    let steps: [(&str, fn(&FitSteps) -> FitFigure); 3] = [
+        ("with the values of the text", |t| t.simulation),
+        ("with estimated parameters and initial states", |t| {
+            t.parameters_only
+        }),
+        ("with what was found", |t| t.augmented),
+    ];
+    let first = usize::from(origin == Origin::Structure);
+    let last = if with_effects { 3 } else { 2 };
+    let (words, figures): (Vec<&str>, Vec<_>) = steps[first..last].iter().copied().unzip();
+    let fits = |o: &OutputFit| figures.iter().map(|f| f(&o.train).fit_percent).collect();
+    let all: Vec<Vec<f64>> = outputs.iter().map(fits).collect();
+    let said = listed(outputs, &all, &words);
     match outputs {
         [one] => format!("Free run of {}: {said}.", one.output),
         _ => format!("Free run of each output, worst first: {said}."),
@@ -371,10 +378,10 @@ fn percent(fit: f64) -> String {
 }
 
 /// Fits of outputs; what each is, is said of the first.
-fn listed<const N: usize>(outputs: &[OutputFit], fits: &[[f64; N]], words: [&str; N]) -> String {
+fn listed<F: AsRef<[f64]>>(outputs: &[OutputFit], fits: &[F], words: &[&str]) -> String {
     let each = outputs.iter().zip(fits).enumerate();
     let each = each.map(|(i, (output, fits))| {
-        let said = fits.iter().zip(words).map(|(fit, word)| match i {
+        let said = fits.as_ref().iter().zip(words).map(|(fit, word)| match i {
             0 => format!("{} {word}", percent(*fit)),
             _ => percent(*fit),
         });
@@ -403,7 +410,7 @@ pub(super) fn as_good(closest: &EffectFound, alternatives: &[Alternative]) -> Op
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::explain::explanation::{Evidence, FitFigure};
+    use crate::explain::explanation::Evidence;
     use std::collections::BTreeMap;
 
     /// An effect with this gain.
@@ -492,7 +499,7 @@ pub(super) mod tests {
     fn all_outputs_are_told() {
         let one = [output("y", [10.0, 20.0, 30.0], Some([5.0, 25.0]))];
         assert_eq!(
-            free_runs(&one, false),
+            free_runs(&one, false, Origin::Text),
             "Free run of y: 10.0 % with the values of the text, 20.0 % with estimated parameters and initial states."
         );
         assert!(
@@ -505,7 +512,7 @@ pub(super) mod tests {
             output("T1", [70.0, 80.0, 90.0], Some([60.0, 85.0])),
         ];
         assert_eq!(
-            free_runs(&two, true),
+            free_runs(&two, true, Origin::Text),
             "Free run of each output, worst first: T2 10.0 % with the values of the text, 20.0 % with estimated parameters and \
              initial states, 30.0 % with what was found; T1 70.0 %, 80.0 %, 90.0 %."
         );

@@ -18,6 +18,15 @@ pub struct PlantOptions {
     pub hypotheses: Vec<Hypothesis>,
 }
 
+/// Where the equations come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Origin {
+    /// The user: parameters are reported that differ from the text.
+    Text,
+    /// A structure that ships with the program: its values are fitted, and all are reported.
+    Structure,
+}
+
 impl Default for PlantOptions {
     fn default() -> Self {
         Self {

@@ -51,7 +51,6 @@ impl Answer<'_> {
         match effect.definition.port() {
             Port::Input | Port::Path => inputs.get(effect.channel).cloned().unwrap_or_default(),
             Port::Sensor | Port::Exact => outputs.get(effect.channel).cloned().unwrap_or_default(),
-            Port::Process => outputs.first().cloned().unwrap_or_default(),
             Port::Force => match effect.signal {
                 Signal::Output(o) | Signal::Integral(o) => outputs[o].clone(),
                 Signal::Difference(i, j) => format!("{} - {}", outputs[i], outputs[j]),
@@ -537,6 +536,5 @@ pub(crate) fn port_name(port: Port) -> &'static str {
         Port::Force => "force",
         Port::Sensor | Port::Exact => "sensor",
         Port::Path => "path",
-        Port::Process => "process",
     }
 }

@@ -95,8 +95,6 @@ impl Answer<'_> {
             &self.known.delays,
             self.data().constant,
         );
-        augmented.initial_state_prior =
-            crate::explain::linear::search::tank_candidates::prior(self.data(), model);
         if self.known.relative {
             augmented.reference = Some(Box::new(AugmentedModel::describe(
                 &self.known.structure,
@@ -338,7 +336,7 @@ impl Answer<'_> {
         let port = (!model.structure.new_effects().is_empty()).then(|| {
             match model.structure.new_effects()[0].definition.port() {
                 Port::Input | Port::Path => "input",
-                Port::Force | Port::Process => "inside",
+                Port::Force => "inside",
                 Port::Sensor | Port::Exact => "output",
             }
             .to_owned()

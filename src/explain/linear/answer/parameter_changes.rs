@@ -32,7 +32,7 @@ impl Answer<'_> {
         let structure = &model.structure;
         // A plant of another class has nothing to compare with.
         let known = &self.known.structure;
-        if structure.is_tanks() || !(structure.plant_free || structure.adjusted > 0) {
+        if !(structure.plant_free || structure.adjusted > 0) {
             return Vec::new();
         }
         let before = self.properties(&known.plant(&known.given()));

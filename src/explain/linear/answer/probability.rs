@@ -55,11 +55,10 @@ const MOST: f64 = 0.99;
 /// Probability below which a name is not given: two of three such names are wrong.
 const UNLIKELY: f64 = 1.0 / 3.0;
 
-/// Whether a name is more than twice as likely wrong as right. The regression holds no drives by their averaged equation, and no plants
-/// of another class.
+/// Whether a name is more than twice as likely wrong as right. The regression holds no drives by their averaged equation.
 pub(crate) fn is_unlikely(finding: &Finding) -> bool {
     let stated = || 1.0 / (1.0 + (-named(finding)).exp());
-    let known = finding.weak.is_none() && !finding.model.structure.is_tanks();
+    let known = finding.weak.is_none();
     finding.verdict == Verdict::Named && known && stated() < UNLIKELY
 }
 

@@ -3,12 +3,12 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::simulate_augmented::AugmentedError;
-use crate::explain::explanation::{AugmentedModel, StatePrior};
+use crate::explain::explanation::AugmentedModel;
 use crate::explain::linear::data::deviation;
 
 /// Samples that an initial state is estimated from, at most.
 const INITIAL_SAMPLES: usize = 2000;
-/// Weight of the prior of an initial state where the model has none: one sample's worth.
+/// Weight of the prior of an initial state: one sample's worth.
 const PRIOR: f64 = 1e-4;
 /// Steps of the search, at most.
 const STEPS: usize = 40;
@@ -29,8 +29,8 @@ impl Prior {
 
 impl AugmentedModel {
     /// The initial state with which the model reproduces the first samples of `outputs` best, by a few steps of Gauss
-    /// and Newton. Spread and level of the states on the recording are the prior (maximum a posteriori), so that
-    /// directions which few samples do not determine stay sensible.
+    /// and Newton. A wide prior around 0 (maximum a posteriori) keeps
+    /// directions sensible which few samples do not determine.
     ///
     /// # Errors
     /// As [`AugmentedModel::simulate`].
@@ -63,7 +63,7 @@ impl AugmentedModel {
             .iter()
             .map(|y| deviation(y[..samples].iter()))
             .collect();
-        let prior = self.prior(&scale)?;
+        let prior = self.prior(&scale);
         let error = |x: &DVector<f64>| -> Result<DVector<f64>, AugmentedError> {
             let y = self.run(&inputs, Some(x.as_slice()))?;
             Ok(DVector::from_iterator(
@@ -74,7 +74,7 @@ impl AugmentedModel {
                 }),
             ))
         };
-        // Where the cost has kinks (a rim, a lost sign) the search ends at the next minimum: it starts from several.
+        // Where the cost has kinks (a lost sign) the search ends at the next minimum: it starts from several.
         let mut best = climb(&error, &prior, prior.mean.clone())?;
         if self.has_kinks() {
             for i in 0..prior.mean.len() {
@@ -96,58 +96,17 @@ impl AugmentedModel {
     fn has_kinks(&self) -> bool {
         self.effects
             .iter()
-            .any(|e| e.effect == "overflow" || e.effect == "sensor_rectification")
+            .any(|e| e.effect == "sensor_rectification")
     }
 
-    fn prior(&self, scale: &[f64]) -> Result<Prior, AugmentedError> {
+    fn prior(&self, scale: &[f64]) -> Prior {
         let n = self.a.0.nrows();
-        let largest = scale.iter().copied().fold(0.0, f64::max);
-        let Some(prior) = &self.initial_state_prior else {
-            let spread = 3.0 * largest;
-            return Ok(Prior {
-                mean: DVector::zeros(n),
-                weight: DMatrix::identity(n, n) * (PRIOR / (spread * spread)),
-                spread: vec![spread; n],
-            });
-        };
-        let inverse = prior.information(n)?;
-        let covariance = prior.covariance.clone().shaped(n, n);
-        Ok(Prior {
-            mean: DVector::from_column_slice(&prior.mean),
-            weight: inverse * (prior.error_std / largest).powi(2),
-            spread: (0..n).map(|i| covariance[(i, i)].sqrt()).collect(),
-        })
-    }
-}
-
-impl StatePrior {
-    /// Whether it is one of `n` states.
-    pub(super) fn check(&self, n: usize) -> Result<(), AugmentedError> {
-        let number = |v: &f64| v.is_finite();
-        if self.mean.len() != n || !self.mean.iter().all(number) {
-            return Err(AugmentedError::Damaged {
-                what: "the prior of the initial state does not fit A".to_owned(),
-            });
+        let spread = 3.0 * scale.iter().copied().fold(0.0, f64::max);
+        Prior {
+            mean: DVector::zeros(n),
+            weight: DMatrix::identity(n, n) * (PRIOR / (spread * spread)),
+            spread: vec![spread; n],
         }
-        if !(self.error_std.is_finite() && self.error_std >= 0.0) {
-            return Err(AugmentedError::Damaged {
-                what: "`error_std` of the initial state is negative".to_owned(),
-            });
-        }
-        self.information(n).map(|_| ())
-    }
-
-    /// Inverse of the covariance.
-    fn information(&self, n: usize) -> Result<DMatrix<f64>, AugmentedError> {
-        let covariance = self.covariance.clone().shaped(n, n);
-        (covariance.shape() == (n, n))
-            .then(|| covariance.cholesky())
-            .flatten()
-            .map(|c| c.inverse())
-            .filter(|inverse| inverse.iter().all(|v| v.is_finite()))
-            .ok_or_else(|| AugmentedError::Damaged {
-                what: "the covariance of the initial state is not positive definite".to_owned(),
-            })
     }
 }
 
@@ -256,13 +215,12 @@ mod tests {
     }
 
     #[test]
-    fn rims_and_lost_signs_have_kinks() {
+    fn lost_signs_have_kinks() {
         let structure = spring(vec![effect("cubic_stiffness", "")]);
         let channels = [Channel::new("c")];
         let mut model =
             AugmentedModel::describe(&structure, &[0.1], &channels, &channels, &[0], false);
         for (id, kinks) in [
-            ("overflow", true),
             ("sensor_rectification", true),
             ("sensor_saturation", false),
             ("cubic_stiffness", false),

@@ -103,7 +103,6 @@ impl AugmentedModel {
                 .collect(),
             effects,
             substeps: structure.substeps,
-            initial_state_prior: None,
             mechanics: None,
             reference: None,
         }
@@ -111,9 +110,7 @@ impl AugmentedModel {
 
     /// The state that is meant where none is given: the operating point.
     pub(super) fn rest(&self) -> Vec<f64> {
-        self.initial_state_prior
-            .as_ref()
-            .map_or_else(|| vec![0.0; self.a.0.nrows()], |prior| prior.mean.clone())
+        vec![0.0; self.a.0.nrows()]
     }
 
     /// Outputs on a new input (`inputs[channel][sample]`, in the units of the recording), from rest or from `initial`.
@@ -249,9 +246,6 @@ impl AugmentedModel {
         if self.initial_states.iter().any(|x0| x0.len() != n) {
             return Err(damaged("an initial state does not fit A"));
         }
-        if let Some(prior) = &self.initial_state_prior {
-            prior.check(n)?;
-        }
         let plant = Plant {
             states: n,
             inputs: r,
@@ -282,9 +276,6 @@ impl AugmentedModel {
                 signal,
                 direction: Direction::Free,
             };
-            if matches!(definition.action, Action::Process) && (l != 1 || !(1..=2).contains(&n)) {
-                return Err(damaged("tanks have one or two levels and one output"));
-            }
             let on_output = matches!(definition.action, Action::Sensor(_));
             let channels = if on_output { l } else { r };
             if places.iter().any(|o| *o >= l) || effect.channel >= channels {

@@ -197,7 +197,7 @@ pub(crate) fn inquire(
     }
     let mut ranked = single_effects(&problem, &finding.boring, allowed);
     let promising: Vec<&Fit> = (ranked.iter())
-        .filter(|r| base - r.criterion > NEEDED && !r.fit.structure.is_tanks())
+        .filter(|r| base - r.criterion > NEEDED)
         .map(|r| &r.fit)
         .collect();
     if finding.boring.improve_from(&problem, &promising) {
@@ -231,25 +231,7 @@ pub(crate) fn inquire(
     let mut ranked_all = ranked.clone();
     let uncertainty = known.uncertainty.as_ref();
     ranked.retain(|r| plant_may_stay(&problem, r, &ranked_all, uncertainty));
-    // Plants of other classes, which no effect added to the linear one becomes.
-    let linear = adequacy(
-        &problem,
-        finding.boring.best(count),
-        &finding.boring.given,
-        None,
-    );
-    let found = ranked.iter().any(|r| base - r.criterion > NEEDED);
-    if found || linear.is_none_or(|a| a.p_value < NOTHING_LEFT) {
-        let others: Vec<&Fit> = ranked
-            .iter()
-            .map(|r| &r.fit)
-            .chain([finding.boring.best(count)])
-            .collect();
-        let tanks = crate::explain::linear::search::tank_candidates::candidates(
-            &problem, structure, allowed, &others,
-        );
-        ranked.extend(tanks);
-    }
+    // Plants of another class, which no effect added to the linear one becomes.
     ranked.extend(
         crate::explain::linear::search::rectified_sensor::candidates(&problem, structure, allowed),
     );
@@ -264,7 +246,7 @@ pub(crate) fn inquire(
     // (beside a plant as given the gain is one over that plant: over a free one it is mostly fewer numbers).
     let best = ranked.iter().take(4).find(|r| {
         let gain = base - r.criterion;
-        let before = if r.fit.structure.plant_free || r.fit.structure.is_tanks() {
+        let before = if r.fit.structure.plant_free {
             finding.boring.best(count)
         } else {
             &finding.boring.near
@@ -278,8 +260,7 @@ pub(crate) fn inquire(
     });
     if let Some(best) = best {
         // A plant of another class has been searched with everything that comes with it, and to the end.
-        let other_class =
-            best.fit.structure.is_tanks() || best.fit.structure.new_effects().len() > 1;
+        let other_class = best.fit.structure.new_effects().len() > 1;
         let mut fit = if other_class {
             best.fit.clone()
         } else {
@@ -458,7 +439,7 @@ fn in_one_recording_each(problem: &Problem, ranked: &[Ranked], base: f64) -> Vec
     let mut best: Vec<&Ranked> = Vec::new();
     let definition = |r: &Ranked| r.fit.structure.new_effects()[0].definition.id;
     for r in ranked {
-        let single = r.fit.structure.new_effects().len() == 1 && !r.fit.structure.is_tanks();
+        let single = r.fit.structure.new_effects().len() == 1;
         if single && best.iter().all(|b| definition(b) != definition(r)) {
             best.push(r);
         }
@@ -546,7 +527,7 @@ fn detectable(
     )> = Vec::new();
     for r in ranked {
         let instance = r.fit.structure.new_effects()[0];
-        if r.fit.structure.is_tanks() || list.iter().any(|l| l.0.id == instance.definition.id) {
+        if list.iter().any(|l| l.0.id == instance.definition.id) {
             continue;
         }
         let (without, theta) = r.fit.structure.without_new_effects(&r.fit.theta);

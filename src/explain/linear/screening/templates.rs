@@ -53,7 +53,7 @@ impl Bench<'_> {
                     columns: self.path_columns(j),
                 })
                 .collect(),
-            Action::Linear(_) | Action::Exact | Action::Process => Vec::new(),
+            Action::Linear(_) | Action::Exact => Vec::new(),
         }
     }
 

@@ -288,6 +288,17 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
         )],
     ),
     effect(
+        "tank_outflow",
+        "free outflow with the square root of a level, where a linear model has one in proportion to it",
+        "A*der(h) = q - c*sqrt(h)",
+        "the equations of levels, of two tanks that ship with the program and are offered beside a linear model",
+        "the levels",
+        &[like(
+            "sensor_saturation",
+            "Stop the inflow and let the tank run empty: a free outflow ends at a time of its own, along a parabola.",
+        )],
+    ),
+    effect(
         "leak",
         "outflow with the square root of a level",
         "A*der(h) = ... + c*sqrt(h)",

@@ -5,7 +5,6 @@
 //! logarithms.
 
 mod added;
-pub(crate) mod tank_simulation;
 #[cfg(test)]
 mod tests;
 pub(crate) mod without_effects;
@@ -151,13 +150,6 @@ impl Structure {
         structure.effects.truncate(self.first_new());
         structure.recording = None;
         structure
-    }
-
-    /// Whether the plant is tanks: the linear plant is then only what they do near their mean levels.
-    pub(crate) fn is_tanks(&self) -> bool {
-        self.effects
-            .iter()
-            .any(|e| matches!(e.definition.action, Action::Process))
     }
 
     /// Effects whose numbers are in the parameter vector.
@@ -511,9 +503,7 @@ impl Structure {
             inputs.to_mut().extend(moments);
         }
         let samples = segment.samples();
-        let mut outputs = if self.is_tanks() {
-            self::tank_simulation::simulate(self, theta, &inputs, x0, clock)?
-        } else if let Some(finer) = &prepared.finer {
+        let mut outputs = if let Some(finer) = &prepared.finer {
             finer.run(&with_paths, forces, x0, &inputs, samples, clock)?
         } else {
             run(
