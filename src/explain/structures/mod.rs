@@ -16,6 +16,7 @@ use std::collections::BTreeMap;
 use self::start::{Started, started};
 use self::text::Marks;
 use super::columns::logs_with_recordings;
+use super::compare_explanations::follows;
 use super::engine::terms::documentation::plant_effect;
 use super::engine::thresholds::NEEDED;
 use super::explanation::{
@@ -95,9 +96,11 @@ pub(crate) fn explain_structure(
     let level = is_level(&recordings);
     let most = linear.map_or(f64::INFINITY, |l| MOST_ERROR * l.fit.train.augmented.rmse);
     let most = most.min(HOPELESS * marks.output_std());
+    // Of a plant that is followed, only a curve may be another plant's.
+    let followed = linear.is_some_and(follows);
     let offered = |s: &&Structure| match &s.lacks {
         Some(lacks) => level && !without.iter().any(|id| id == lacks.effect),
-        None => true,
+        None => !followed,
     };
     let started = STRUCTURES.iter().filter(offered).filter_map(|s| {
         let started = started(s.equations, &marks, &recordings, Hold::Zero)?;
@@ -140,6 +143,19 @@ pub(crate) fn explain_structure(
     Some(best)
 }
 
+/// Effects that the equations of a structure have from the start.
+pub(crate) fn own_effects(explanation: &Explanation) -> usize {
+    let own = |id: &str| {
+        let mut lacks = STRUCTURES.iter().filter_map(|s| s.lacks.as_ref());
+        lacks.any(|l| l.effect == id)
+    };
+    explanation
+        .effects
+        .iter()
+        .filter(|e| own(&e.effect))
+        .count()
+}
+
 fn explain(started: &Started, checked: &Checked, without: &[String]) -> Option<Explanation> {
     let known = without.iter().filter(|id| plant_effect(id).is_some());
     let options = PlantOptions {
@@ -148,14 +164,18 @@ fn explain(started: &Started, checked: &Checked, without: &[String]) -> Option<E
         ..PlantOptions::default()
     };
     let (logs, recordings) = logs_with_recordings(checked.recordings.iter().cloned());
-    explain_equations(
-        &started.plant,
-        &logs,
-        recordings,
-        &options,
-        Origin::Structure,
-    )
-    .ok()
+    let (plant, origin) = (&started.plant, Origin::Structure);
+    let mut explanation = explain_equations(plant, &logs, recordings, &options, origin).ok()?;
+    // The signals of a recording are its channels, not states that nobody has named.
+    let log = logs.first()?;
+    for effect in &mut explanation.effects {
+        let channels = match effect.port.as_str() {
+            "input" => &log.inputs,
+            _ => &log.outputs,
+        };
+        effect.signal = channels.first()?.name.clone();
+    }
+    Some(explanation)
 }
 
 impl Lacks {
@@ -193,7 +213,7 @@ impl Lacks {
             effect: self.effect.to_owned(),
             hypothesis: false,
             variant: String::new(),
-            signal: lower.clone(),
+            signal: marks.output_name(),
             port: "process".to_owned(),
             equation,
             enters: Some(lower),

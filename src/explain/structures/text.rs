@@ -67,6 +67,11 @@ impl Marks {
         self.output.1.std
     }
 
+    /// The name of the output's channel.
+    pub(super) fn output_name(&self) -> String {
+        self.output.0.0.name.clone()
+    }
+
     /// Name of the state that follows the output with this suffix.
     pub(super) fn state(&self, suffix: &str) -> String {
         self.output.0.suffixed(suffix)

@@ -12,6 +12,11 @@ use crate::noise::{Colour, Noise, Series};
 use crate::physics::simulated::Run;
 use crate::physics::simulation::{Direction, Observer, Plan, Point, Trajectory};
 
+/// A covariance is believed where the deviance rises by at least this at a standard deviation, where a parabola rises by 1.
+const LEAST_RISE: f64 = 0.1;
+/// Steps that are tried for a difference, each the root of 10 times the one before: eight decades beyond the derivative's.
+const MOST_STEPS: usize = 16;
+
 /// Runs of all recordings at a point.
 struct Runs {
     at: Vec<f64>,
@@ -236,6 +241,86 @@ impl<'p, 'a> Deviance<'p, 'a> {
                 given_noise: nothing_known(),
             };
         };
+        let first = self.covariances_from(&plant, &runs);
+        if self.foretells(point, &first.given_noise) {
+            return first;
+        }
+        match self.secants(point, &plant) {
+            Some(secants) => self.covariances_from(&secants, &runs),
+            None => first,
+        }
+    }
+
+    /// Whether the deviance rises as the covariance foretells, by 1 at a standard deviation, or at least by a part of that. Where an
+    /// equation has a kink with an infinite slope, as a root at 0, derivatives at a point may be any number of times too large.
+    fn foretells(&mut self, point: &[f64], covariance: &DMatrix<f64>) -> bool {
+        let Some(base) = Objective::deviance(self, point) else {
+            return true;
+        };
+        let ranges = self.problem.ranges();
+        (0..ranges.len()).all(|i| {
+            let std = covariance[(i, i)].max(0.0).sqrt();
+            if !std.is_finite() || std == 0.0 {
+                return true;
+            }
+            let mut rises = [1.0, -1.0].into_iter().filter_map(|sign: f64| {
+                let moved: Vec<f64> = (0..point.len())
+                    .map(|j| point[j] + sign * covariance[(j, i)] / std)
+                    .collect();
+                let inside = moved.iter().zip(&ranges);
+                let inside = inside.into_iter().all(|(p, r)| *p >= r.min && *p <= r.max);
+                inside.then(|| Objective::deviance(self, &moved))?
+            });
+            // What leaves the bounds, or cannot be simulated, is not asked.
+            rises.all(|deviance| deviance - base > LEAST_RISE)
+        })
+    }
+
+    /// Derivatives as differences over such a step of each number that the deviance rises by about 1; those of `exact` where no step
+    /// within the bounds does that.
+    fn secants(&mut self, point: &[f64], exact: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let runs = self.at(point)?;
+        let base = self.noise.whiten_kept(&runs.residual, &self.problem.mask);
+        let deviance = self.noise.deviance(&runs.residual, &self.problem.mask);
+        let ranges = self.problem.ranges();
+        let mut secants = exact.clone();
+        for (i, range) in ranges.iter().enumerate() {
+            let mut step = 1.0 / exact.column(i).norm();
+            for _ in 0..MOST_STEPS {
+                if !step.is_finite() || step == 0.0 {
+                    break;
+                }
+                let mut moved = point.to_vec();
+                moved[i] += step;
+                if moved[i] > range.max {
+                    step = -step;
+                    moved[i] = point[i] + step;
+                }
+                if moved[i] < range.min || moved[i] > range.max {
+                    break;
+                }
+                let Some(there) = self.at(&moved) else {
+                    break;
+                };
+                let e = self.noise.whiten_kept(&there.residual, &self.problem.mask);
+                if e.len() != base.len() {
+                    break;
+                }
+                let rise = self.noise.deviance(&there.residual, &self.problem.mask) - deviance;
+                let column = e.iter().zip(&base).map(|(e, base)| (base - e) / step);
+                secants.set_column(i, &DVector::from_iterator(base.len(), column));
+                if rise.abs() > LEAST_RISE {
+                    break;
+                }
+                step *= 10f64.sqrt();
+            }
+        }
+        Some(secants)
+    }
+
+    fn covariances_from(&self, plant: &DMatrix<f64>, runs: &Runs) -> Covariances {
+        let m = plant.ncols();
+        let nothing_known = || DMatrix::from_diagonal_element(m, m, f64::INFINITY);
         let of_noise = self.noise_columns(&runs.residual);
         let all = DMatrix::from_fn(plant.nrows(), m + of_noise.len(), |i, j| {
             match j.checked_sub(m) {
@@ -256,7 +341,7 @@ impl<'p, 'a> Deviance<'p, 'a> {
         };
         Covariances {
             joint: inverse(&all),
-            given_noise: inverse(&plant),
+            given_noise: inverse(plant),
         }
     }
 

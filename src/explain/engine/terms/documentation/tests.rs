@@ -71,11 +71,16 @@ fn names() -> BTreeSet<&'static str> {
     all
 }
 
+/// Of the structures that ship with the program.
+const OWN_EFFECTS: [&str; 1] = ["tank_outflow"];
+
 #[test]
 fn every_name_is_described_and_every_description_is_a_name() {
     let described: BTreeSet<&str> = PLANT_EFFECTS.iter().map(|e| e.id).collect();
     assert_eq!(described.len(), PLANT_EFFECTS.len(), "an id twice");
-    assert_eq!(names(), described);
+    // What structures have from the start is no term of the library.
+    let all: BTreeSet<&str> = names().into_iter().chain(OWN_EFFECTS).collect();
+    assert_eq!(all, described);
 }
 
 #[test]
