@@ -10,8 +10,7 @@ use crate::explain::engine::fitting::fitted::{Fitted, TIE};
 use crate::explain::engine::select::CHANCE;
 use crate::explain::engine::thresholds::{LEFT, NEEDED, SURE};
 use crate::explain::explanation::{
-    Alternative, EffectFound, FitFigure, FitSteps, JointTest, OutputFit, ParameterChange, Quantity,
-    Verdict,
+    Alternative, EffectFound, FitSteps, JointTest, OutputFit, ParameterChange, Quantity, Verdict,
 };
 use crate::physics::estimate::{EstimateError, PlantRecording};
 use crate::physics::{Equation, VariableId};
@@ -350,19 +349,20 @@ fn held_out(outputs: &[OutputFit]) -> Option<String> {
 
 /// Free runs of all outputs.
 fn free_runs(outputs: &[OutputFit], with_effects: bool, origin: Origin) -> String {
-    let steps: [(&str, fn(&FitSteps) -> FitFigure); 3] = [
-        ("with the values of the text", |t| t.simulation),
-        ("with estimated parameters and initial states", |t| {
-            t.parameters_only
-        }),
-        ("with what was found", |t| t.augmented),
+    let words = [
+        "with the values of the text",
+        "with estimated parameters and initial states",
+        "with what was found",
     ];
     let first = usize::from(origin == Origin::Structure);
     let last = if with_effects { 3 } else { 2 };
-    let (words, figures): (Vec<&str>, Vec<_>) = steps[first..last].iter().copied().unzip();
-    let fits = |o: &OutputFit| figures.iter().map(|f| f(&o.train).fit_percent).collect();
+    let fits = |o: &OutputFit| {
+        let t: &FitSteps = &o.train;
+        let all = [t.simulation, t.parameters_only, t.augmented];
+        all.map(|f| f.fit_percent)[first..last].to_vec()
+    };
     let all: Vec<Vec<f64>> = outputs.iter().map(fits).collect();
-    let said = listed(outputs, &all, &words);
+    let said = listed(outputs, &all, &words[first..last]);
     match outputs {
         [one] => format!("Free run of {}: {said}.", one.output),
         _ => format!("Free run of each output, worst first: {said}."),
@@ -410,7 +410,7 @@ pub(super) fn as_good(closest: &EffectFound, alternatives: &[Alternative]) -> Op
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::explain::explanation::Evidence;
+    use crate::explain::explanation::{Evidence, FitFigure};
     use std::collections::BTreeMap;
 
     /// An effect with this gain.
