@@ -176,11 +176,15 @@ fn is_drive(explanation: &Explanation) -> bool {
     model.is_some_and(|model| model.mechanics.is_some())
 }
 
-/// Whether the run with what was found follows the recording, and nothing is left beside it.
-pub(crate) fn follows(explanation: &Explanation) -> bool {
+/// Whether the run with what was found follows the recording.
+pub(crate) fn runs_close(explanation: &Explanation) -> bool {
     explanation.verdict != Verdict::Unexplained
-        && explanation.remaining.adequate
         && explanation.fit.train.augmented.fit_percent >= FOLLOWS
+}
+
+/// The same where nothing is left beside it.
+pub(crate) fn follows(explanation: &Explanation) -> bool {
+    runs_close(explanation) && explanation.remaining.adequate
 }
 
 /// Whether another plant may explain more than a linear explanation, which names nothing surely, or leaves structure or much of the

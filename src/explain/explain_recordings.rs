@@ -2,7 +2,7 @@
 
 use super::columns;
 use super::compare_explanations::{
-    agree, doubt, follows, is_doubtful, is_sure, leaves_room, replaces, stands_in, supersedes,
+    agree, doubt, is_doubtful, is_sure, leaves_room, replaces, runs_close, stands_in, supersedes,
     unless_refuted,
 };
 use super::document::explain_error::ExplainError;
@@ -77,7 +77,7 @@ pub fn explain(
     let simulator = match know(&checked) {
         Err(unstable @ ExplainError::Unstable { .. }) => {
             let structure = explain_structure(&checked, &options.without, None);
-            return structure.filter(follows).ok_or(unstable);
+            return structure.filter(runs_close).ok_or(unstable);
         }
         simulator => simulator?,
     };

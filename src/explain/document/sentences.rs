@@ -47,6 +47,9 @@ const HARDLY: f64 = 10.0;
 /// Probability by chance from which on what is left is called noise.
 const WHITE: f64 = 0.01;
 
+/// Digits after the point, at most.
+const MOST_DIGITS: i32 = 9;
+
 /// `0.42 +- 0.03 N`.
 pub(crate) fn quantity(q: &Quantity) -> String {
     let unit = if q.unit.is_empty() {
@@ -56,8 +59,11 @@ pub(crate) fn quantity(q: &Quantity) -> String {
     };
     match q.std {
         Some(std) if std > 0.0 && std < HARDLY * q.value.abs().max(1e-300) => {
-            let digits = (1 - std.log10().floor() as i32).clamp(0, 9) as usize;
-            if (1e-4..1e6).contains(&q.value.abs()) {
+            let wanted = 1 - std.log10().floor() as i32;
+            let digits = wanted.clamp(0, MOST_DIGITS) as usize;
+            if wanted > MOST_DIGITS + 1 {
+                format!("{:.digits$} +- {std:.0e}{unit}", q.value)
+            } else if (1e-4..1e6).contains(&q.value.abs()) {
                 format!("{:.digits$} +- {std:.digits$}{unit}", q.value)
             } else {
                 format!("{} +- {std:.1e}{unit}", number(q.value))

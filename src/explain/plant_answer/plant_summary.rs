@@ -128,8 +128,10 @@ impl Answer<'_> {
         }
         lines.extend(self.shared_terms(told.effects));
         lines.extend(changes(told.parameters, self.origin));
-        lines.extend(bounds_in_words(&bounds.determined, told));
-        lines.extend((!bounds.undetermined.is_empty()).then(|| {
+        // The bounds of a structure are those of physics: a spring that is not there is at one.
+        let written = self.origin == Origin::Text;
+        lines.extend(bounds_in_words(&bounds.determined, told).filter(|_| written));
+        lines.extend((written && !bounds.undetermined.is_empty()).then(|| {
             format!(
                 "At a bound of the text, and the recording alone says less of it than its bounds: {}.",
                 bounds.undetermined.join(", ")
