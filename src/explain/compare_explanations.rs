@@ -201,12 +201,12 @@ pub(crate) fn leaves_room(linear: &Explanation) -> bool {
 
 /// Whether an explanation by another plant stands in the place of a linear one: of one without a name as equations do ([`stands_in`]),
 /// of one with a name where it has one too and its run is clearly closer, or as close where its class has the curve from the start,
-/// which the linear one fits with more numbers. `own` effects are those of the class itself.
-pub(crate) fn supersedes(other: &Explanation, own: usize, linear: &Explanation) -> bool {
+/// which the linear one fits with more numbers. A curve beside that of the class is no better than one alone.
+pub(crate) fn supersedes(other: &Explanation, linear: &Explanation) -> bool {
     if linear.verdict == Verdict::Unexplained {
         return stands_in(other, linear);
     }
-    let simpler = other.effects.len() <= own + linear.effects.len();
+    let simpler = other.effects.len() <= linear.effects.len();
     let most = match is_curve(linear) && simpler && other.remaining.adequate {
         true => 1.0 + EQUAL,
         false => (1.0 - MOST).sqrt(),
@@ -309,20 +309,20 @@ mod tests {
         let other = with(1.0, Verdict::Named, "tank_outflow");
         assert!(leaves_room(&curve) && leaves_room(&unexplained));
         assert!(!leaves_room(&with(1.0, Verdict::Parameters, "law")));
-        assert!(supersedes(&other, 1, &curve) && supersedes(&other, 1, &unexplained));
+        assert!(supersedes(&other, &curve) && supersedes(&other, &unexplained));
         assert!(!supersedes(
             &other,
-            1,
             &with(1.0, Verdict::Named, "input_delay")
         ));
         assert!(supersedes(
             &with(0.5, Verdict::Named, "tank_outflow"),
-            1,
             &with(1.0, Verdict::Named, "input_delay")
         ));
+        let mut two = other.clone();
+        two.effects.push(curve.effects[0].clone());
+        assert!(!supersedes(&two, &curve));
         assert!(!supersedes(
             &with(0.5, Verdict::Parameters, "tank_outflow"),
-            1,
             &curve
         ));
 

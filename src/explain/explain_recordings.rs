@@ -21,7 +21,7 @@ use super::linear::nonlinear_simulator::NonlinearSimulator;
 use super::linear::screening::output_adequacy::LEVEL;
 use super::memory;
 use super::simulation::Simulation;
-use super::structures::{explain_structure, own_effects};
+use super::structures::explain_structure;
 use crate::log::Log;
 use crate::noise::{Mask, effective_samples};
 
@@ -164,7 +164,7 @@ fn second_opinion(explanation: Explanation, checked: &Checked, options: &Options
         return explanation;
     }
     let other = explain_structure(checked, &options.without, Some(&explanation));
-    let other = other.filter(|o| supersedes(o, own_effects(o), &explanation));
+    let other = other.filter(|other| supersedes(other, &explanation));
     other.unwrap_or(explanation)
 }
 

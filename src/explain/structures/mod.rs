@@ -143,19 +143,6 @@ pub(crate) fn explain_structure(
     Some(best)
 }
 
-/// Effects that the equations of a structure have from the start.
-pub(crate) fn own_effects(explanation: &Explanation) -> usize {
-    let own = |id: &str| {
-        let mut lacks = STRUCTURES.iter().filter_map(|s| s.lacks.as_ref());
-        lacks.any(|l| l.effect == id)
-    };
-    explanation
-        .effects
-        .iter()
-        .filter(|e| own(&e.effect))
-        .count()
-}
-
 fn explain(started: &Started, checked: &Checked, without: &[String]) -> Option<Explanation> {
     let known = without.iter().filter(|id| plant_effect(id).is_some());
     let options = PlantOptions {
