@@ -1,6 +1,7 @@
 //! Which of two explanations of simulated columns is given, and what is taken back where the simulator is not understood.
 
-use super::explanation::{Explanation, Verdict};
+use super::explanation::{Explanation, SignalTraces, Verdict};
+use crate::noise::{Mask, effective_samples};
 
 /// An effect beside a simulator that is neither linear nor reproduced by equations must take this part off the mean square of the
 /// error in blocks left out: more is explained than is not.
@@ -10,6 +11,10 @@ const MOST: f64 = 0.5;
 const MOST_INSIDE: f64 = 0.75;
 /// Runs whose errors differ by less than this part are equally good (the tolerance of the project's score on real recordings).
 const EQUAL: f64 = 0.02;
+
+/// Twice the logarithm of a Bayes factor that is very strong evidence for one of two models (R. E. Kass and A. E. Raftery, *J. Am.
+/// Stat. Assoc.* 90, 1995).
+const VERY_STRONG: f64 = 10.0;
 
 /// A free run with at least this fit (in percent) follows the recording: it leaves 1 % of the variance.
 const FOLLOWS: f64 = 90.0;
@@ -199,20 +204,36 @@ pub(crate) fn leaves_room(linear: &Explanation) -> bool {
     }
 }
 
+/// Decrease of Schwarz's criterion of an explanation against a run with so many times its error and so many parameters less, under
+/// white noise of as many values as are independent.
+pub(crate) fn criterion_gain(explanation: &Explanation, times: f64, parameters: usize) -> f64 {
+    let errors = |t: &SignalTraces| -> Vec<f64> {
+        let pairs = t.recorded.iter().zip(&t.augmented);
+        pairs.map(|(y, s)| y - s).collect()
+    };
+    let residual: Vec<Vec<f64>> = explanation.signals.iter().map(errors).collect();
+    let mask: Mask = residual.iter().map(|e| vec![true; e.len()]).collect();
+    let count = effective_samples(&residual, &mask).max(1.0);
+    2.0 * count * times.ln() - parameters as f64 * count.ln()
+}
+
 /// Whether an explanation by another plant stands in the place of a linear one: of one without a name as equations do ([`stands_in`]),
 /// of one with a name where it has one too and its run is clearly closer, or as close where its class has the curve from the start,
-/// which the linear one fits with more numbers. A curve beside that of the class is no better than one alone.
+/// which the linear one fits with more numbers. With a second effect beside that of its class it must be the likelier one.
 pub(crate) fn supersedes(other: &Explanation, linear: &Explanation) -> bool {
     if linear.verdict == Verdict::Unexplained {
         return stands_in(other, linear);
     }
+    let parameters = |e: &Explanation| e.effects.iter().map(|e| e.parameters.len()).sum::<usize>();
+    let more = parameters(other).saturating_sub(parameters(linear));
     let simpler = other.effects.len() <= linear.effects.len();
-    let most = match is_curve(linear) && simpler && other.remaining.adequate {
-        true => 1.0 + EQUAL,
-        false => (1.0 - MOST).sqrt(),
+    let closer = |error: f64| match is_curve(linear) && other.remaining.adequate {
+        true if simpler => error <= 1.0 + EQUAL,
+        true => criterion_gain(other, 1.0 / error, more) > VERY_STRONG,
+        false => error <= (1.0 - MOST).sqrt(),
     };
     matches!(other.verdict, Verdict::Named | Verdict::Family)
-        && error_over(other, linear).is_some_and(|error| error <= most)
+        && error_over(other, linear).is_some_and(closer)
 }
 
 /// Whether two explanations name the same effects. They were found in different ways, so that each confirms the other.

@@ -29,5 +29,6 @@ mod plant_neighbours;
 mod plant_pairs;
 mod plant_parameters;
 mod plant_parts;
+mod plant_position_loops;
 mod plant_search;
 mod plant_sparse;

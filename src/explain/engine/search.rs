@@ -253,7 +253,7 @@ fn without_first(
     (both - alone.gain < needed).then_some(alone)
 }
 
-/// Other first effects beside which a second is looked for, where the first leaves structure and nothing beside it explains that.
+/// Other first effects beside which a second is looked for, where what was found leaves structure.
 const OTHER_FIRSTS: usize = 4;
 
 /// What the equations leave out. The fit of the plant alone may be known.
@@ -271,7 +271,7 @@ pub(crate) fn search(
     let forward = |known, begun| forward(plant, recordings, hold, scope, objective, known, begun);
     let found = forward(known, None)?;
     let (strongest, tests) = found.left();
-    let all = found.steps.first().filter(|_| found.accepted == 1);
+    let all = found.steps.first().filter(|_| found.accepted > 0);
     let Some([first, others @ ..]) = all.map(Vec::as_slice) else {
         return Ok(found);
     };
@@ -307,7 +307,8 @@ pub(crate) fn search(
         };
         pairs.extend(forward(Some(&found.baseline), Some(step)).ok());
     }
-    let least = first.gain + TIE.0.max(TIE.1 * first.gain);
+    let gain = found.gain();
+    let least = gain + TIE.0.max(TIE.1 * gain);
     let pairs = pairs
         .into_iter()
         .filter(|p| p.accepted > 1 && p.gain() > least);

@@ -16,15 +16,12 @@ use std::collections::BTreeMap;
 use self::start::{Started, started};
 use self::text::Marks;
 use super::columns::logs_with_recordings;
-use super::compare_explanations::follows;
+use super::compare_explanations::{criterion_gain, follows};
 use super::engine::terms::documentation::plant_effect;
 use super::engine::thresholds::NEEDED;
-use super::explanation::{
-    EffectFound, Evidence, Explanation, ParameterChange, Quantity, SignalTraces, Verdict,
-};
+use super::explanation::{EffectFound, Evidence, Explanation, ParameterChange, Quantity, Verdict};
 use super::linear::check::Checked;
 use super::plant_answer::{Origin, PlantOptions, explain_equations, spoken};
-use crate::noise::{Mask, effective_samples};
 use crate::physics::Hold;
 use crate::physics::estimate::PlantRecording;
 
@@ -94,7 +91,9 @@ pub(crate) fn explain_structure(
     let marks = Marks::of(&checked.recordings)?;
     let recordings: Vec<PlantRecording> = checked.recordings.iter().map(Into::into).collect();
     let level = is_level(&recordings);
-    let most = linear.map_or(f64::INFINITY, |l| MOST_ERROR * l.fit.train.augmented.rmse);
+    let most = linear.map_or(f64::INFINITY, |l| {
+        MOST_ERROR * l.fit.train.parameters_only.rmse
+    });
     let most = most.min(HOPELESS * marks.output_std());
     // Of a plant that is followed, only a curve may be another plant's.
     let followed = linear.is_some_and(follows);
@@ -188,6 +187,7 @@ impl Lacks {
             .map(|p| (p.name.clone(), quantity(p)))
             .collect();
         let equation = marks.fill(self.equation, f64::NAN);
+        let error = explanation.fit.train.augmented.rmse.max(f64::MIN_POSITIVE);
         let states: Vec<String> = self.states.iter().map(|s| marks.state(s)).collect();
         let lower = states.last().cloned().unwrap_or_default();
         let sentence = format!(
@@ -207,7 +207,7 @@ impl Lacks {
             depends: states,
             law: None,
             evidence: Evidence {
-                criterion_gain: gain(explanation, linear_error, parameters.len()),
+                criterion_gain: criterion_gain(explanation, linear_error / error, parameters.len()),
                 criterion_needed: NEEDED,
                 heldout_gain: None,
                 halves_disagree: None,
@@ -217,19 +217,6 @@ impl Lacks {
         };
         explanation.effects.insert(0, effect);
     }
-}
-
-/// Decrease of Schwarz's criterion against a run with this error, under white noise of as many values as are independent.
-fn gain(explanation: &Explanation, linear_error: f64, parameters: usize) -> f64 {
-    let errors = |t: &SignalTraces| -> Vec<f64> {
-        let pairs = t.recorded.iter().zip(&t.augmented);
-        pairs.map(|(y, s)| y - s).collect()
-    };
-    let residual: Vec<Vec<f64>> = explanation.signals.iter().map(errors).collect();
-    let mask: Mask = residual.iter().map(|e| vec![true; e.len()]).collect();
-    let count = effective_samples(&residual, &mask).max(1.0);
-    let error = explanation.fit.train.augmented.rmse.max(f64::MIN_POSITIVE);
-    2.0 * count * (linear_error / error).ln() - parameters as f64 * count.ln()
 }
 
 /// Whether the output is one that is not negative.

@@ -6,6 +6,7 @@ use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::names::{SPECIFIC, name_rank, named, rank, special_case};
 use crate::explain::engine::terms::term::{Needs, Starts};
+use crate::explain::engine::terms::values::WAVES;
 use crate::physics::ModelSpec;
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 
@@ -167,7 +168,7 @@ pub(in crate::explain::engine) fn searched(lead: &Lead, recordings: &[PlantRecor
         .map(|shape| match shape.starts {
             Starts::Length(_) | Starts::Instants(_) => 2.0 * (samples / 20.0).ln(),
             // As many as are tried of a position.
-            Starts::Waves(_) => 2.0 * 47f64.ln(),
+            Starts::Waves => 2.0 * f64::from(WAVES).ln(),
             // As many frequencies as the spectrum of the recording has.
             Starts::Peaks => 2.0 * (samples / 2.0).ln(),
             // As many as are tried: see `Screen`.

@@ -23,13 +23,19 @@ const WIDTHS: Starts = Starts::Spread(&[0.1, 0.2, 0.5, 1.0, 2.0]);
 const MIDDLES: Starts = Starts::Quantiles(&[0.1, 0.3, 0.5, 0.7, 0.9]);
 const POWERS: Starts = Starts::Powers(&[0.5, 1.5, 2.5, 4.0]);
 
-/// Functions of one variable with one or two shapes: powers, growth, decay, saturation, rise and fall.
+/// Functions of one variable with one or two shapes: powers, growth, decay, saturation, orifices, rise and fall.
 const FORMULAS: &[Term] = &[
     law("sign({z})*abs({z})^{p}", &[shape("p", POWERS, true)]),
     law("abs({z})^{p}", &[shape("p", POWERS, true)]),
     law("exp({z}/{s})", &[shape("s", WIDTHS, true)]),
     law("exp(-{z}/{s})", &[shape("s", WIDTHS, true)]),
     law("tanh({z}/{s})", &[shape("s", WIDTHS, true)]),
+    law("{z}/({s} + abs({z}))", &[shape("s", WIDTHS, true)]),
+    // Through an orifice, laminar at small differences of pressure: the root alone has an infinite slope where it turns.
+    law(
+        "{z}/({z}^2 + {s}^2)^0.25",
+        &[shape("s", Starts::Spread(&[0.02, 0.1, 0.3]), true)],
+    ),
     law("{z}*exp(-({z}/{s})^2)", &[shape("s", WIDTHS, true)]),
     law("{z}/(1 + ({z}/{s})^2)", &[shape("s", WIDTHS, true)]),
     law("1/(1 + ({z}/{s})^2)", &[shape("s", WIDTHS, true)]),

@@ -9,6 +9,7 @@ use crate::explain::engine::hypothesis::Ground;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::TERMS;
+use crate::explain::engine::terms::names::called;
 use crate::explain::engine::terms::richer::richer;
 use crate::explain::engine::terms::term::{Needs, Port, Term, curve};
 use crate::explain::engine::terms::values::{grid, starts};
@@ -267,6 +268,37 @@ pub(in crate::explain::engine) fn as_plain_functions(
         thoroughly(glanced, ground)
     });
     fits.collect()
+}
+
+/// A function without a name in each other equation where it has one: what a motor's torque does, its voltage hardly does otherwise.
+/// A screen has one wave number for each place, and the best at one may be found at another.
+pub(in crate::explain::engine) fn named_elsewhere(
+    fitted: &Fitted,
+    given: &ModelSpec,
+    arguments: &[Argument],
+    ground: &Ground,
+) -> Vec<Fitted> {
+    let (spec, lead) = (&ground.plant.spec, &fitted.lead);
+    let (Place::Equation(_), Some(argument)) = (lead.place, lead.argument) else {
+        return vec![];
+    };
+    let variables = &arguments[argument].variables;
+    let is_named = |place: Place| called(spec, lead.term, place, variables) != "law";
+    if lead.curve.is_some() || is_named(lead.place) {
+        return vec![];
+    }
+    let others = places(spec, given).into_iter();
+    let others = others.filter(|place| matches!(place, Place::Equation(_)) && is_named(*place));
+    let fits = others.collect::<Vec<_>>().into_par_iter();
+    fits.filter_map(|place| {
+        let there = Lead::untested(lead.term, place).at(place, Some(argument), &fitted.shapes);
+        let first = ground.study.parameters();
+        let shapes: Vec<usize> = (first..first + fitted.shapes.len()).collect();
+        // How strong it is there is found first.
+        let held = |study: &Study, from: &Fit| study.holding(from, &shapes, THOROUGH);
+        thoroughly(instead(fitted, there, &held, arguments, ground)?, ground)
+    })
+    .collect()
 }
 
 fn glance(study: &Study, from: &Fit) -> Option<Fit> {

@@ -6,7 +6,8 @@ use crate::explain::engine::fitting::edit::Place;
 use crate::explain::engine::fitting::fitted::{Fitted, TIE};
 use crate::explain::engine::fitting::formulas::formulas;
 use crate::explain::engine::fitting::neighbours::{
-    also_elsewhere, as_parameter_changes, as_plain_functions, of_one_variable, richer_form,
+    also_elsewhere, as_parameter_changes, as_plain_functions, named_elsewhere, of_one_variable,
+    richer_form,
 };
 use crate::explain::engine::fitting::refined_curve::refined_curve;
 use crate::explain::engine::hypothesis::Ground;
@@ -74,6 +75,7 @@ pub(super) fn add_neighbours(
     };
     let mut more = as_parameter_changes(one, stage.given, arguments, ground);
     more.extend(as_plain_functions(one, arguments, ground));
+    more.extend(named_elsewhere(one, stage.given, arguments, ground));
     let best_of_more = more.iter_mut().max_by(|a, b| a.gain.total_cmp(&b.gain));
     if let Some(better) = best_of_more.filter(|f| f.gain > one.gain)
         && let Some(richer) = richer_form(better, arguments, ground)

@@ -46,13 +46,7 @@ pub(super) const fn hysteresis(memories: &'static [Memory], shapes: &'static [Sh
 
 /// Wave number and phase in an angle.
 const WAVE: &[Shape] = &[
-    shape(
-        "k",
-        Starts::Waves(&[
-            1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0,
-        ]),
-        true,
-    ),
+    shape("k", Starts::Waves, true),
     shape(
         "p",
         Starts::Values(&[0.0, std::f64::consts::FRAC_PI_2]),
@@ -395,7 +389,7 @@ pub(crate) const TERMS: &[Term] = &[
     Term {
         id: "input_dead_zone",
         port: Input,
-        needs: BothSigns,
+        needs: Anything,
         form: "-min(max({z}, -{d}), {d})",
         memories: &[],
         shapes: &[DEAD_ZONE],

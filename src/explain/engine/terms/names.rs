@@ -61,7 +61,17 @@ fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
 fn is_of_speed(unit: &str) -> bool {
     matches!(
         unit,
-        "m/s" | "cm/s" | "mm/s" | "km/h" | "kn" | "rad/s" | "deg/s" | "rpm" | "rev/min"
+        "m/s"
+            | "cm/s"
+            | "mm/s"
+            | "km/h"
+            | "kn"
+            | "rad/s"
+            | "deg/s"
+            | "rpm"
+            | "rev/min"
+            | "r/min"
+            | "1/min"
     )
 }
 
@@ -314,6 +324,8 @@ pub(crate) fn called(
         },
         (Port::Equation, "root_above") if *variables == [own] && may_be_level => "overflow",
         (Port::Equation, "root") if *variables == [own] && may_be_level => "leak",
+        // A voltage that goes round with an angle is none of its forces.
+        (Port::Equation, "sine") if matches!(unit_of_place, "A" | "mA") => "law",
         (Port::Equation, "sine") => "cogging",
         (Port::Equation, "gravity") => "gravity_torque",
         (Port::Equation, "periodic") => "periodic_disturbance",

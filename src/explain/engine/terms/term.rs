@@ -60,8 +60,8 @@ pub(crate) enum Starts {
     /// The same of sizes at which something snaps: what a recording says of them changes in jumps, and the screen looks between
     /// these for the best.
     Releases(&'static [f64]),
-    /// Wave numbers with so many periods in the range of an angle, and more of whole ones.
-    Waves(&'static [f64]),
+    /// Wave numbers with every half period more in the range of an argument, and more of whole ones in an angle.
+    Waves,
     /// Parts of the recording's length.
     Length(&'static [f64]),
     /// Instants, as parts of the recording's length; the screen looks between them for the sample.

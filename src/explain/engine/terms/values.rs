@@ -14,8 +14,10 @@ const IN_A_TURN: [f64; 22] = [
     1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 15.0, 16.0, 18.0, 20.0, 21.0,
     24.0, 28.0, 30.0, 36.0, 48.0,
 ];
-/// Most periods of what is periodic along a line that are looked for.
-const PERIODS: u32 = 24;
+/// Most periods of what is periodic along a path that are looked for.
+const PERIODS: u32 = 48;
+/// Wave numbers that are tried of a position: every half period from the first.
+pub(in crate::explain::engine) const WAVES: u32 = 2 * PERIODS - 1;
 /// A memory that follows at once does so in a sample divided by this.
 const FAST: f64 = 5.0;
 
@@ -42,7 +44,7 @@ pub(in crate::explain::engine) fn starts(
         Starts::Travel(parts) => of(parts, &|a, p| p * a.travel(h)),
         Starts::Rate(parts) => of(parts, &|a, p| p * a.range() / h),
         Starts::RateSize(parts) => of(parts, &|a, p| p * a.rate_size(h)),
-        Starts::Waves(counts) => argument.map_or_else(Vec::new, |a| waves(counts, a, h)),
+        Starts::Waves => argument.map_or_else(Vec::new, |a| waves(a, h)),
         Starts::Length(parts) => parts.iter().map(|p| p * samples as f64 * h).collect(),
         Starts::Instants(parts) => {
             let (begin, end) = PlantRecording::span(recordings);
@@ -58,21 +60,19 @@ pub(in crate::explain::engine) fn starts(
     }
 }
 
-/// Wave numbers with so many periods in the range of an angle, and beyond these whole ones; of a position, which no whole number of
-/// periods goes around, every half period more. As far as samples resolve them.
-fn waves(counts: &[f64], along: &Argument, sample_time: f64) -> Vec<f64> {
+/// Wave numbers with every half period more in the range of an argument: one between two of them goes out of step with neither. Of an
+/// angle also the whole ones beyond these that machines have. As far as samples resolve them.
+fn waves(along: &Argument, sample_time: f64) -> Vec<f64> {
     const TURN: f64 = 2.0 * std::f64::consts::PI;
-    let in_range = counts.iter().map(|n| TURN * n / along.range());
-    let most = in_range.clone().fold(0.0, f64::max);
+    let half = 0.5 * TURN / along.range();
+    let most = f64::from(2 * PERIODS) * half;
     let resolved = 0.5 * TURN / (sample_time * along.rate_size(sample_time));
-    let more: Vec<f64> = match along.angle {
-        true => IN_A_TURN.into_iter().filter(|k| *k >= most).collect(),
-        false => (2..=2 * PERIODS)
-            .map(|n| 0.5 * f64::from(n) * TURN / along.range())
-            .collect(),
-    };
-    let more = more.into_iter().filter(|k| *k < resolved);
-    in_range.filter(|_| along.angle).chain(more).collect()
+    let beyond = IN_A_TURN.iter().filter(|k| along.angle && **k > most);
+    let halves = (2..=2 * PERIODS).map(|n| f64::from(n) * half);
+    halves
+        .chain(beyond.copied())
+        .filter(|k| *k < resolved)
+        .collect()
 }
 
 /// Mean time between values of the first output: the sample time, unless some are missing.

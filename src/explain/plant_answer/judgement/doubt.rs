@@ -11,6 +11,8 @@ const STEP: f64 = 0.25;
 const BY_CHANCE: f64 = 0.05;
 /// Standard deviations of an instant within which it may be another.
 const NEAR: f64 = 2.0;
+/// Steps back to where an input was before, beyond the one at the instant, that show that a change is not its effect.
+const RETURNS: usize = 3;
 
 /// Why an effect is not named.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,7 +69,24 @@ pub(in crate::explain::plant_answer) fn is_safe(law: &Law, state: Option<&str>) 
     known && !(state.is_some() && state == first && (grows(low) || grows(high)))
 }
 
-/// The input that steps at an instant, where its steps are so few that this is no chance.
+/// Whether an input comes back so often to where it was before an instant that what it does there would have shown before.
+fn returns(i: usize, time: f64, recordings: &[PlantRecording]) -> bool {
+    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    let (mut times, mut last) = (0, f64::NAN);
+    for r in recordings {
+        for (k, &u) in r.inputs[i].iter().enumerate() {
+            if r.start_time + (k as f64) * r.sample_time < time {
+                (least, most) = (least.min(u), most.max(u));
+            } else if (u - last).abs() >= STEP * (most - least) && least <= u && u <= most {
+                times += 1;
+            }
+            last = u;
+        }
+    }
+    times > RETURNS
+}
+
+/// The input that steps at an instant, where its steps are so few that this is no chance, and it is rarely back where it was.
 fn begins_with((time, std): (f64, f64), recordings: &[PlantRecording]) -> Option<usize> {
     let inputs = recordings.first()?.inputs.len();
     let (begin, end) = PlantRecording::span(recordings);
@@ -89,7 +108,7 @@ fn begins_with((time, std): (f64, f64), recordings: &[PlantRecording]) -> Option
             count += 1.0;
             at_step |= (time - at).abs() <= near;
         }
-        at_step && 2.0 * near * count < BY_CHANCE * (end - begin)
+        at_step && 2.0 * near * count < BY_CHANCE * (end - begin) && !returns(i, time, recordings)
     })
 }
 
@@ -143,6 +162,9 @@ mod tests {
         // Of many steps one is always near.
         let many: Vec<usize> = (0..100).map(|k| 10 * k + 5).collect();
         assert_eq!(begins_with((65.5, 0.01), &[recording(&many)]), None);
+        // It goes on as before.
+        let on = recording(&[200, 300, 600, 700, 800, 900]);
+        assert_eq!(begins_with((35.0, 0.01), &[on]), None);
         // An input that does not move has no steps.
         assert_eq!(begins_with((65.0, 0.01), &[recording(&[])]), None);
     }
