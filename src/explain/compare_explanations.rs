@@ -219,7 +219,8 @@ pub(crate) fn criterion_gain(explanation: &Explanation, times: f64, parameters: 
 
 /// Whether an explanation by another plant stands in the place of a linear one: of one without a name as equations do ([`stands_in`]),
 /// of one with a name where it has one too and its run is clearly closer, or as close where its class has the curve from the start,
-/// which the linear one fits with more numbers. With a second effect beside that of its class it must be the likelier one.
+/// which the linear one fits with more numbers. With a second effect beside that of its class it must be the likelier one; a curve
+/// beside it is no better than one alone.
 pub(crate) fn supersedes(other: &Explanation, linear: &Explanation) -> bool {
     if linear.verdict == Verdict::Unexplained {
         return stands_in(other, linear);
@@ -229,8 +230,8 @@ pub(crate) fn supersedes(other: &Explanation, linear: &Explanation) -> bool {
     let simpler = other.effects.len() <= linear.effects.len();
     let closer = |error: f64| match is_curve(linear) && other.remaining.adequate {
         true if simpler => error <= 1.0 + EQUAL,
-        true => criterion_gain(other, 1.0 / error, more) > VERY_STRONG,
-        false => error <= (1.0 - MOST).sqrt(),
+        true if !is_curve(other) => criterion_gain(other, 1.0 / error, more) > VERY_STRONG,
+        _ => error <= (1.0 - MOST).sqrt(),
     };
     matches!(other.verdict, Verdict::Named | Verdict::Family)
         && error_over(other, linear).is_some_and(closer)

@@ -405,7 +405,7 @@ fn forward(
                 recordings,
                 options: &options,
                 scope,
-                open: &open,
+                trials: &asked,
             };
             let found = step(&stage);
             attempts += 1;

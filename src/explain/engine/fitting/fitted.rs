@@ -98,9 +98,14 @@ impl Fitted {
 
     /// The factor of a term whose size its shapes do not fix.
     pub(in crate::explain::engine) fn strength(&self) -> f64 {
-        let first = self.candidate.plant.spec.parameters().len() - self.candidate.values.len();
-        let at = first + self.shapes.len();
-        self.fit.point.get(at).copied().unwrap_or(0.0)
+        self.values().get(self.shapes.len()).copied().unwrap_or(0.0)
+    }
+
+    /// The values that the term added to the plant.
+    pub(in crate::explain::engine) fn values(&self) -> &[f64] {
+        let end = self.candidate.plant.spec.parameters().len();
+        let first = end - self.candidate.values.len();
+        self.fit.point.get(first..end).unwrap_or_default()
     }
 
     /// The second equation that the term enters, and its strength there.

@@ -62,10 +62,13 @@ pub(crate) struct Trial {
     pub(crate) accepted: Option<usize>,
 }
 
-/// Fits the hypotheses that are still open.
-pub(crate) fn trials(all: &[Hypothesis], open: &[usize], ground: &Ground) -> Vec<Fitted> {
-    open.par_iter()
-        .filter_map(|&which| all[which].fitted(which, ground))
+/// Fits the hypotheses that are not yet part of the plant; those that were fitted alone before also from there.
+pub(crate) fn trials(all: &[Hypothesis], before: &[Trial], ground: &Ground) -> Vec<Fitted> {
+    (all.par_iter().zip(before).enumerate())
+        .filter(|(_, (_, trial))| trial.accepted.is_none())
+        .filter_map(|(which, (hypothesis, trial))| {
+            hypothesis.fitted(which, trial.alone.as_ref(), ground)
+        })
         .collect()
 }
 
@@ -84,12 +87,13 @@ pub(crate) fn prefer_asked(fitted: &mut [Fitted]) {
 }
 
 impl Hypothesis {
-    fn fitted(&self, which: usize, ground: &Ground) -> Option<Fitted> {
+    fn fitted(&self, which: usize, alone: Option<&Fitted>, ground: &Ground) -> Option<Fitted> {
         let spec = &ground.plant.spec;
         let place = self.place(spec)?;
         let parameters = ground.study.parameters();
         let options = with_more(ground.options, self.numbers.len());
-        let (starts, searched, range) = self.starts(ground);
+        let (mut starts, searched, range) = self.starts(ground);
+        starts.extend(alone.map(|f| f.values().to_vec()));
         let made: Vec<Candidate> = starts
             .iter()
             .filter_map(|values| self.candidate(spec, values).ok())

@@ -12,7 +12,7 @@ use super::fitting::edit::Place;
 use super::fitting::finish::finished;
 use super::fitting::fitted::{Fitted, order};
 use super::fitting::formulas::FORMULA;
-use super::hypothesis::{Ground, trials};
+use super::hypothesis::{Ground, Trial, trials};
 use super::scope::Scope;
 use super::terms::names::named;
 use super::thresholds::{BETTER, FINISHED, NEEDED, THOROUGH};
@@ -35,8 +35,8 @@ pub(super) struct Stage<'a> {
     pub(super) recordings: &'a [PlantRecording],
     pub(super) options: &'a EstimateOptions,
     pub(super) scope: &'a Scope,
-    /// Hypotheses that are not yet part of the plant.
-    pub(super) open: &'a [usize],
+    /// What was found out about each hypothesis before.
+    pub(super) trials: &'a [Trial],
 }
 
 /// What a step has found.
@@ -111,7 +111,7 @@ pub(super) fn step(stage: &Stage) -> Step {
         recordings,
         options,
     };
-    fitted.extend(trials(&scope.hypotheses, stage.open, &ground));
+    fitted.extend(trials(&scope.hypotheses, stage.trials, &ground));
     if let Some(first) = origins.all.first() {
         let arguments = &first.screen.arguments;
         add_formulas(&mut fitted, arguments, (stage, &ground));

@@ -448,6 +448,8 @@ pub(in crate::explain::engine) fn rank_of(
                 // What a sensor does at its own time comes last; and where nothing drives the plant it lags only by where it was at
                 // the start, which a second store does too.
                 _ if term.id == "sensor_drift" => 3,
+                // A motion that never turns is slowed by friction sooner than its sensor has an offset.
+                _ if term.id == "sensor_offset" && is_velocity(spec, &[own]) => 1,
                 _ if term.port == Port::Sensor
                     && !term.memories.is_empty()
                     && spec.inputs().is_empty() =>
