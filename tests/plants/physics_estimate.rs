@@ -269,3 +269,53 @@ fn a_flow_over_a_rim_is_as_uncertain_as_the_noise_makes_it() {
         }
     }
 }
+
+/// A scale that stands in every coefficient, and a phase that the angle at the start makes up for: two directions that nothing is
+/// known of. Deviations of what is in one of them were those of the other numbers held.
+#[test]
+fn two_directions_that_a_recording_leaves_open() {
+    let kind = Kind {
+        name: "drive whose speed is measured",
+        text: "model D parameter Real k(min=0.04, max=0.09) = 0.06; parameter Real J(min=2e-4, max=4.5e-4) = 3e-4;
+               parameter Real b(min=2e-4, max=1e-3) = 5e-4; parameter Real c(min=0, max=0.01) = 0.003; parameter Real p(min=-3, max=3) = 0.4;
+               input Real u; output Real y; Real q(start=0); Real w(start=0);
+               equation der(q) = w; J*der(w) = k*u - b*w - c*sin(2*q + p); y = w; end D;",
+        truth: &[0.066, 3.3e-4, 7e-4, 0.004, 0.7],
+        derivative: |x, u, p| {
+            let force = p[0] * u - p[2] * x[1] - p[3] * (2.0 * x[0] + p[4]).sin();
+            vec![x[1], force / p[1]]
+        },
+        start: &[0.0, 0.0],
+        output: 1,
+        sample_time: 0.02,
+        noise: 0.3,
+        slow: 0.0,
+        loop_gain: None,
+        size: 0.4,
+        level: 0.5,
+    };
+    let plant = Plant::new(parse(kind.text).unwrap());
+    let recording = record(&kind, 1500, 7);
+    let options = EstimateOptions {
+        free: vec![true; 5],
+        hold: Hold::Zero,
+        form: Some(Form::FreeRun),
+        least_squares: false,
+    };
+    let found = estimate(&plant, &[recording], &options).unwrap();
+    for (parameter, truth) in found.parameters.iter().zip(kind.truth) {
+        let far = (parameter.value - truth).abs() / parameter.std;
+        assert!(far < 4.0, "{parameter:?} is {truth}");
+    }
+    let open = |name: &str| {
+        found
+            .undetermined
+            .iter()
+            .any(|u| u.parameters.iter().any(|p| p == name))
+    };
+    assert!(
+        ["k", "J", "b", "c", "p"].iter().all(|name| open(name)),
+        "{:?}",
+        found.undetermined
+    );
+}

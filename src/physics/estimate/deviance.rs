@@ -14,6 +14,8 @@ use crate::physics::simulation::{Direction, Observer, Plan, Point, Trajectory};
 
 /// A covariance is believed where the deviance rises by at least this at a standard deviation, where a parabola rises by 1.
 const LEAST_RISE: f64 = 0.1;
+/// Part of the largest deviation that the ridge allows, from which on a number is not determined.
+const UNDETERMINED: f64 = 0.01;
 /// Steps that are tried for a difference, each the root of 10 times the one before: eight decades beyond the derivative's.
 const MOST_STEPS: usize = 16;
 
@@ -242,7 +244,7 @@ impl<'p, 'a> Deviance<'p, 'a> {
             };
         };
         let first = self.covariances_from(&plant, &runs);
-        if self.foretells(point, &first.given_noise) {
+        if self.foretells(point, &first.given_noise, &plant) {
             return first;
         }
         match self.secants(point, &plant) {
@@ -252,15 +254,23 @@ impl<'p, 'a> Deviance<'p, 'a> {
     }
 
     /// Whether the deviance rises as the covariance foretells, by 1 at a standard deviation, or at least by a part of that. Where an
-    /// equation has a kink with an infinite slope, as a root at 0, derivatives at a point may be any number of times too large.
-    fn foretells(&mut self, point: &[f64], covariance: &DMatrix<f64>) -> bool {
+    /// equation has a kink with an infinite slope, as a root at 0, derivatives at a point may be any number of times too large. What
+    /// the recordings do not determine has the deviation that the ridge gives it: nothing rises there, and nothing is wrong.
+    fn foretells(
+        &mut self,
+        point: &[f64],
+        covariance: &DMatrix<f64>,
+        derivatives: &DMatrix<f64>,
+    ) -> bool {
         let Some(base) = Objective::deviance(self, point) else {
             return true;
         };
         let ranges = self.problem.ranges();
         (0..ranges.len()).all(|i| {
             let std = covariance[(i, i)].max(0.0).sqrt();
-            if !std.is_finite() || std == 0.0 {
+            // Against the deviation with everything else known.
+            let times = std * derivatives.column(i).norm();
+            if !times.is_finite() || times == 0.0 || times > UNDETERMINED / RIDGE.sqrt() {
                 return true;
             }
             let mut rises = [1.0, -1.0].into_iter().filter_map(|sign: f64| {
