@@ -61,12 +61,12 @@ pub(crate) fn quantity(q: &Quantity) -> String {
         Some(std) if std > 0.0 && std < HARDLY * q.value.abs().max(1e-300) => {
             let wanted = 1 - std.log10().floor() as i32;
             let digits = wanted.clamp(0, MOST_DIGITS) as usize;
-            if wanted > MOST_DIGITS + 1 {
-                format!("{:.digits$} +- {std:.0e}{unit}", q.value)
-            } else if (1e-4..1e6).contains(&q.value.abs()) {
-                format!("{:.digits$} +- {std:.digits$}{unit}", q.value)
-            } else {
+            if !(1e-4..1e6).contains(&q.value.abs()) {
                 format!("{} +- {std:.1e}{unit}", number(q.value))
+            } else if wanted > MOST_DIGITS + 1 {
+                format!("{:.digits$} +- {std:.0e}{unit}", q.value)
+            } else {
+                format!("{:.digits$} +- {std:.digits$}{unit}", q.value)
             }
         }
         Some(std) if std > 0.0 => format!(
@@ -312,6 +312,7 @@ mod tests {
         assert_eq!(said(0.4213, Some(0.031)), "0.421 +- 0.031 s");
         assert_eq!(said(-12.0, Some(3.0)), "-12.0 +- 3.0 s");
         assert_eq!(said(2.5e-7, Some(1e-8)), "2.500e-7 +- 1.0e-8 s");
+        assert_eq!(said(1.216e-10, Some(1e-12)), "1.216e-10 +- 1.0e-12 s");
         assert_eq!(
             said(0.5548, Some(28.0)),
             "0.5548 s (hardly determined: +- 28.00 s)"

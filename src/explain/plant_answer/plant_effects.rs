@@ -163,20 +163,32 @@ impl Answer<'_> {
         label: &str,
     ) -> Vec<String> {
         let mut lines = self.own_estimates(fitted, effect, label);
-        // What a parameter is besides, which may differ from the text without being surely different.
-        if let Place::Parameter(v) = fitted.lead.place {
-            let name = &self.plant.spec.variable(v).name;
-            let spec = &self.found.plant.spec;
+        // What a parameter is besides, which may differ from the text without being surely different; and beside a curve those of its
+        // equation, from which it counts.
+        let (given, place) = (&self.plant.spec, fitted.lead.place);
+        let replaced = fitted
+            .hypothesis
+            .is_some_and(|which| self.hypotheses[which].replaces());
+        let beside: Vec<VariableId> = match place {
+            Place::Parameter(v) if !replaced => vec![v],
+            place if fitted.lead.curve.is_some() => {
+                let parameters = given.parameters().into_iter();
+                parameters.filter(|&v| place.uses(given, v)).collect()
+            }
+            _ => vec![],
+        };
+        let spec = &self.found.plant.spec;
+        let known = beside.into_iter().filter_map(|v| {
+            let name = &given.variable(v).name;
             let called = |&v: &VariableId| spec.variable(v).name == *name;
-            let at = spec.parameters().iter().position(called);
-            let value = at.and_then(|at| self.found.fit.point.get(at));
-            lines.extend(value.map(|&value| {
-                let (std, unit) = (None, self.unit(name));
-                format!(
-                    "There, {name} = {}.",
-                    quantity(&Quantity { value, std, unit })
-                )
-            }));
+            let at = spec.parameters().iter().position(called)?;
+            let (value, std, unit) = (*self.found.fit.point.get(at)?, None, self.unit(name));
+            let quantity = quantity(&Quantity { value, std, unit });
+            Some(format!("{name} = {quantity}"))
+        });
+        let known: Vec<String> = known.collect();
+        if !known.is_empty() {
+            lines.push(format!("There, {}.", known.join(", ")));
         }
         lines
     }

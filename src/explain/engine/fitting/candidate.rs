@@ -181,7 +181,12 @@ pub(crate) fn candidate(
         format!("({body})")
     };
     debug_assert!(!(lead.sensor && term.port != Port::Sensor));
-    edit.changes.push((lead.place, format!("{{v}} + {added}")));
+    // What stands in the place of a signal is written without it: `u_acting = delay(u, T)`.
+    let whole = (term.port != Port::Equation && !term.free_strength && lead.curve.is_none())
+        .then(|| body.strip_suffix(&format!(" - {text}")))
+        .flatten();
+    let change = whole.map_or_else(|| format!("{{v}} + {added}"), str::to_owned);
+    edit.changes.push((lead.place, change));
     if let Some((other, strength)) = lead.arrives {
         let there = spec.variable(spec.equations[other].unknown.variable());
         let wanted = format!("{}_{}_{}", term.id, term.symbol, there.column());

@@ -66,6 +66,11 @@ const MOST_NUMBERS: usize = 20;
 type Part = (Token, Span);
 
 impl Hypothesis {
+    /// Whether it stands in the place of what the text has there.
+    pub(crate) fn replaces(&self) -> bool {
+        self.change == Change::Replace
+    }
+
     /// Reads a hypothesis about a plant.
     ///
     /// # Errors

@@ -52,6 +52,8 @@ pub(crate) struct Argument {
 
 /// Temperature of a room, 20 degC, as in [`ArgumentForm::Radiation`].
 const ROOM: &str = "2.9315^4";
+/// What is smaller than this part of the largest value for this part of the time comes down to zero.
+const AT_ZERO: f64 = 0.1;
 /// Part of its range that an argument must go back for a reversal: noise of a sensor is less.
 const BACK: f64 = 0.1;
 /// Samples that quantiles are taken of.
@@ -208,6 +210,9 @@ impl Argument {
         match needs {
             Needs::Anything => true,
             Needs::BothSigns => both,
+            Needs::AboutZero => {
+                both || self.size_quantile(AT_ZERO) < AT_ZERO * self.size_quantile(1.0)
+            }
             Needs::Positive => self.quantile(0.0) >= 0.0,
             Needs::Radiation => self.form == ArgumentForm::Radiation,
             Needs::Driven => self.form == ArgumentForm::Driven && both,

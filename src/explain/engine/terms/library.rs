@@ -13,8 +13,8 @@ pub(super) const TIMES: &[f64] = &[
 ];
 
 use Needs::{
-    AlongPath, Angle, Anything, BothSigns, Difference, Directed, Driven, OneWay, OwnState,
-    Positive, Radiation, Stretch, SwitchedOn, Time, Velocity,
+    AboutZero, AlongPath, Angle, Anything, BothSigns, Difference, Directed, Driven, OneWay,
+    OwnState, Positive, Radiation, Stretch, SwitchedOn, Time, Velocity,
 };
 use Port::{Equation, Input, Parameter, Sensor};
 
@@ -389,8 +389,8 @@ pub(crate) const TERMS: &[Term] = &[
     Term {
         id: "input_dead_zone",
         port: Input,
-        needs: Anything,
-        form: "-min(max({z}, -{d}), {d})",
+        needs: AboutZero,
+        form: "max({z} - {d}, 0) + min({z} + {d}, 0) - {z}",
         memories: &[],
         shapes: &[DEAD_ZONE],
         free_strength: false,

@@ -254,6 +254,7 @@ pub(in crate::explain::engine) fn special_case(id: &str) -> Option<&'static str>
         "stribeck_friction" => Some("coulomb_friction"),
         "asymmetric_damping" | "extra_mode" => Some("viscous_friction"),
         "hysteresis" => Some("input_backlash"),
+        "cogging" => Some("gravity_torque"),
         _ => None,
     }
 }

@@ -135,7 +135,7 @@ const fn limits(
 
 const DEAD_ZONE_OF_TWO: &[Term] = &[limits(
     "input_dead_zone",
-    "-min(max({z}, -{d}), {other})",
+    "max({z} - {other}, 0) + min({z} + {d}, 0) - {z}",
     &[DEAD_ZONE, OTHER],
     BothSigns,
 )];

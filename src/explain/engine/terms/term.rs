@@ -20,6 +20,8 @@ pub(crate) enum Needs {
     Anything,
     /// Both signs occur.
     BothSigns,
+    /// The same, or it comes down to zero: what acts about zero shows.
+    AboutZero,
     /// Never below zero.
     Positive,
     /// A difference of fourth powers of absolute temperatures.
