@@ -4,7 +4,7 @@ use super::library::{
     ABOVE, BACKLASH, BELOW, DEAD_ZONE, HYSTERESIS, LIMIT, STEP, STICTION, STOP, UPPER_LIMIT,
     hysteresis,
 };
-use super::term::Needs::{self, Anything, BothSigns, Time};
+use super::term::Needs::{self, AboutZero, Anything, BothSigns, Time};
 use super::term::Port::{self, Equation, Input, Parameter, Sensor};
 use super::term::{Memory, MemoryStart, Shape, Starts, Term, curve, in_place, sampled, shape};
 
@@ -137,7 +137,7 @@ const DEAD_ZONE_OF_TWO: &[Term] = &[limits(
     "input_dead_zone",
     "max({z} - {other}, 0) + min({z} + {d}, 0) - {z}",
     &[DEAD_ZONE, OTHER],
-    BothSigns,
+    AboutZero,
 )];
 const LIMITS_OF_TWO: &[Term] = &[limits(
     "input_saturation",
