@@ -93,3 +93,33 @@ fn an_input_that_is_switched_on_may_arrive_late() {
     let delay = number(&said, 0, "input_delay_T");
     assert!((delay - 0.07).abs() < 0.005, "{delay}");
 }
+
+/// A fogger that does nothing below 12 %, and a sensor that follows late: beside the lag the dead zone is plain, alone it says little.
+#[test]
+fn an_effect_that_says_little_alone_is_proven_beside_a_second() {
+    let command = |k: usize| (levels(24, -20.0, 80.0)(k)).max(0.0);
+    let log = recorded(
+        "fogger,humidity",
+        (2400, 5.0),
+        &[&command],
+        |x, u, _| {
+            let fog = 0.004 * (u[0] - 12.0).max(0.0);
+            vec![fog - (x[0] - 6.0) / 420.0, (x[0] - x[1]) / 25.0]
+        },
+        (&[8.0, 8.0], &[(1, 0.04)]),
+    );
+    let said = explained(
+        &Folder::new(),
+        &log,
+        "model Fog\n  parameter Real b(min=0.002, max=0.008) = 0.005;\n  parameter Real tau(unit=\"s\", min=200, max=800) = 300;\n  parameter Real out(unit=\"g/m3\", min=3, max=9) = 5;\n  input Real fogger(unit=\"%\");\n  output Real humidity(unit=\"g/m3\");\n  Real x(unit=\"g/m3\", start=8);\nequation\n  der(x) = b*fogger - (x - out)/tau;\n  humidity = x;\nend Fog;\n",
+    );
+    let mut names = effects(&said);
+    names.sort_unstable();
+    assert_eq!(
+        names,
+        ["input_dead_zone", "sensor_lag"],
+        "{}",
+        said["summary"]
+    );
+    assert_eq!(said["verdict"], "named", "{}", said["summary"]);
+}

@@ -76,7 +76,7 @@ impl Found {
     }
 
     /// What its effects gain together.
-    fn gain(&self) -> f64 {
+    pub(crate) fn gain(&self) -> f64 {
         let accepted = self.steps.iter().take(self.accepted);
         accepted
             .filter_map(|step| step.first())

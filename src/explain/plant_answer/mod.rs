@@ -182,7 +182,8 @@ impl Answer<'_> {
 
     fn explanation(&self, recordings: Vec<Recording>) -> Explanation {
         let best = self.found.steps.first().and_then(|s| s.first());
-        let gain = best.map_or(0.0, |b| b.gain);
+        // Of two effects each is needed beside the other, or it would have been dropped: what both gain proves them.
+        let gain = self.found.gain();
         let parameters = self.parameters();
         let (statistic, tests) = self.found.left();
         let p_value = (tests as f64 * chance(statistic)).min(1.0);

@@ -68,15 +68,15 @@ impl Answer<'_> {
                     lines.push(format!("{}.", effect.sentence));
                     lines.extend(self.estimates(fitted, effect, "Estimated"));
                 }
-                let first = self.effects().next();
-                lines.extend(first.filter(|f| f.gain < SURE).map(|f| {
-                    format!(
+                let gain = self.found.gain();
+                if gain < SURE {
+                    lines.push(format!(
                         "By BIC alone it would not be named (gain {}, needed {}): it takes more than half of the mean square off \
                          held-out blocks, and no other function takes as much off them.",
-                        number(f.gain),
+                        number(gain),
                         number(SURE)
-                    )
-                }));
+                    ));
+                }
                 lines.push(format!(
                     "Probability that this is right: {:.0} %; {}.",
                     100.0 * told.probability,
