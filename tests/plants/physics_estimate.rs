@@ -76,6 +76,16 @@ const KINDS: [Kind; 3] = [
     },
 ];
 
+/// All of so many parameters, in free run.
+fn free_run(parameters: usize) -> EstimateOptions {
+    EstimateOptions {
+        free: vec![true; parameters],
+        hold: Hold::Zero,
+        form: Some(Form::FreeRun),
+        least_squares: false,
+    }
+}
+
 fn normal(random: &mut impl Rng) -> f64 {
     StandardNormal.sample(random)
 }
@@ -253,12 +263,7 @@ fn a_flow_over_a_rim_is_as_uncertain_as_the_noise_makes_it() {
     let plant = Plant::new(parse(kind.text).unwrap());
     for seed in [3, 4, 5] {
         let recording = record(&kind, 1000, seed);
-        let options = EstimateOptions {
-            free: vec![true; 4],
-            hold: Hold::Zero,
-            form: Some(Form::FreeRun),
-            least_squares: false,
-        };
+        let options = free_run(4);
         let found = estimate(&plant, &[recording], &options).unwrap();
         for (parameter, truth) in found.parameters.iter().zip(kind.truth) {
             let far = (parameter.value - truth).abs() / parameter.std;
@@ -296,12 +301,7 @@ fn two_directions_that_a_recording_leaves_open() {
     };
     let plant = Plant::new(parse(kind.text).unwrap());
     let recording = record(&kind, 1500, 7);
-    let options = EstimateOptions {
-        free: vec![true; 5],
-        hold: Hold::Zero,
-        form: Some(Form::FreeRun),
-        least_squares: false,
-    };
+    let options = free_run(5);
     let found = estimate(&plant, &[recording], &options).unwrap();
     for (parameter, truth) in found.parameters.iter().zip(kind.truth) {
         let far = (parameter.value - truth).abs() / parameter.std;
