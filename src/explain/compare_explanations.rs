@@ -49,28 +49,40 @@ pub(crate) fn is_doubtful(explanation: &Explanation) -> bool {
         }
 }
 
-/// Takes back names beside which blocks of the recording that were not fitted are followed worse than without them. What is read off
+/// Takes back names beside which blocks of the recording that were not fitted are followed worse than without them, or, of names that
+/// are more likely wrong than right, no better. What is read off
 /// the data, such as the step of a coarse sensor, has no gain in a criterion and makes no fit better.
 pub(crate) fn unless_refuted(mut explanation: Explanation) -> Explanation {
     let named = matches!(explanation.verdict, Verdict::Named | Verdict::Family);
     let mut effects = explanation.effects.iter();
     let fitted = effects.any(|e| e.evidence.criterion_gain > 0.0);
-    if named && fitted && removed(&explanation) < 1.0 - (1.0 + EQUAL).powi(2) {
+    if !(named && fitted) {
+        return explanation;
+    }
+    // What is more likely wrong than right must show there.
+    let shows = explanation.probability > 0.5 || explanation.fit.heldout.is_none();
+    let least = if shows { -EQUAL } else { EQUAL };
+    let removed = removed(&explanation);
+    if removed < 1.0 - (1.0 - least).powi(2) {
+        let than = if removed < 0.0 { "worse" } else { "no better" };
         take_back(
             &mut explanation,
             Verdict::Unexplained,
-            "Something is left out, and the following is not sure: over blocks of the recording that were not fitted, simulations are worse with it than without it.",
+            &format!(
+                "Something is left out, and the following is not sure: over blocks of the recording that were not fitted, simulations are {than} with it than without it."
+            ),
         );
     }
     explanation
 }
 
-/// Whether an explanation relative to a linear simulator needs no second opinion: it found nothing, or a listed effect, or a law of
-/// outputs without units, whose name depends on these.
+/// Whether an explanation relative to a linear simulator needs no second opinion: it found nothing, or a listed effect that is more
+/// likely right than wrong, or a law of outputs without units, whose name depends on these.
 pub(crate) fn is_sure(explanation: &Explanation, has_units: bool) -> bool {
     match explanation.verdict {
         Verdict::Consistent | Verdict::Parameters => true,
-        Verdict::Named | Verdict::Family => !(has_units && is_law(explanation)),
+        Verdict::Named | Verdict::Family if is_law(explanation) => !has_units,
+        Verdict::Named | Verdict::Family => explanation.probability > 0.5,
         Verdict::Unexplained => false,
     }
 }
@@ -80,11 +92,17 @@ fn is_law(explanation: &Explanation) -> bool {
 }
 
 /// Whether an explanation by the equations of a linear simulator replaces one that is not sure: it names what the other does not, or
-/// a listed effect where the other has a law, and follows the recording as closely.
+/// a listed effect where the other has a law, and follows the recording as closely; or it follows clearly closer than another name.
 pub(crate) fn replaces(equations: &Explanation, other: &Explanation) -> bool {
     let more = match other.verdict {
         Verdict::Unexplained => stands_in(equations, other),
-        _ => !is_law(equations) && error_over(equations, other).is_some_and(|e| e <= 1.0 + EQUAL),
+        _ => {
+            let most = match is_law(other) {
+                true => 1.0 + EQUAL,
+                false => (1.0 - MOST).sqrt(),
+            };
+            !is_law(equations) && error_over(equations, other).is_some_and(|e| e <= most)
+        }
     };
     equations.verdict == Verdict::Named && more
 }

@@ -148,18 +148,19 @@ fn second_opinion(explanation: Explanation, checked: &Checked, options: &Options
     if !checked.troubles.is_empty() {
         return explanation;
     }
-    if !is_sure(&explanation, has_units) {
-        let by_equations = || {
-            let equations = columns::equations(checked)?;
-            if equations.misfit > columns::REPRODUCED {
-                return None;
-            }
-            columns::explain_equations(&equations, checked, &options.without)
-        };
-        if let Some(other) = by_equations().filter(|other| replaces(other, &explanation)) {
-            return other;
+    let by_equations = || {
+        let equations = columns::equations(checked)?;
+        if equations.misfit > columns::REPRODUCED {
+            return None;
         }
-    }
+        columns::explain_equations(&equations, checked, &options.without)
+    };
+    let unsure = !is_sure(&explanation, has_units);
+    let other = unsure.then(by_equations).flatten();
+    let explanation = match other.filter(|other| replaces(other, &explanation)) {
+        Some(other) => other,
+        None => explanation,
+    };
     if !leaves_room(&explanation) {
         return explanation;
     }

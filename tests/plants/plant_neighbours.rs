@@ -208,3 +208,57 @@ fn a_parameter_falls_along_a_variable() {
     assert_eq!(said["effects"][0]["depends"], serde_json::json!(["w", "c"]));
     assert_eq!(said["remaining"]["adequate"], true);
 }
+
+/// A spring that stiffens about its rest, which the gauge shows as 8 mm: of the cube of the gauge's value nothing is to be seen.
+#[test]
+fn a_spring_stiffens_about_its_rest_wherever_the_gauge_has_its_zero() {
+    let force = levels(30, -90.0, 90.0);
+    let log = recorded(
+        "F,shown",
+        (1500, 0.02),
+        &[&force],
+        |x, u, _| {
+            let stretch = x[0] - 8.0;
+            vec![
+                x[1],
+                4.0 * u[0] - 220.0 * stretch - 0.15 * stretch.powi(3) - 6.0 * x[1],
+            ]
+        },
+        (&[8.0, 0.0], &[(0, 0.01)]),
+    );
+    let said = explained(
+        &Folder::new(),
+        &log,
+        "model Table\n  parameter Real k(min=50, max=500) = 300;\n  parameter Real d(min=1, max=20) = 8;\n  parameter Real b(min=1, max=10) = 5;\n  parameter Real c(min=0, max=5000) = 1500;\n  input Real F(unit=\"N\");\n  output Real shown(unit=\"mm\");\n  Real x(unit=\"mm\", start=8);\n  Real v(unit=\"mm/s\", start=0);\nequation\n  der(x) = v;\n  der(v) = b*F - k*x - d*v + c;\n  shown = x;\nend Table;\n",
+    );
+    assert_eq!(effects(&said), ["cubic_stiffness"], "{}", said["summary"]);
+    let rest = number(&said, 0, "cube_o");
+    assert!((rest - 8.0).abs() < 0.2, "{rest}");
+}
+
+/// A throttle that acts between two limits: two numbers, where a curve of the input needs a dozen.
+#[test]
+fn an_input_with_two_limits_that_differ_is_no_curve() {
+    let throttle = levels(25, 25.0, 80.0);
+    let log = recorded(
+        "throttle,climb",
+        (1500, 0.1),
+        &[&throttle],
+        |x, u, _| {
+            let acts = u[0].clamp(41.0, 61.0);
+            vec![(acts - 50.0 - x[0]) / 0.3, (0.4 * x[0] - x[1]) / 1.5]
+        },
+        (&[0.0, 0.0], &[(1, 0.05)]),
+    );
+    let said = explained(
+        &Folder::new(),
+        &log,
+        "model Drone\n  parameter Real K(min=0.1, max=1) = 0.3;\n  parameter Real T(unit=\"s\", min=0.5, max=4) = 1;\n  parameter Real hover(min=40, max=60) = 48;\n  final parameter Real lag(unit=\"s\") = 0.3;\n  input Real throttle(unit=\"%\");\n  output Real climb(unit=\"m/s\");\n  Real thrust(unit=\"%\", start=0);\n  Real w(unit=\"m/s\", start=0);\nequation\n  lag*der(thrust) = throttle - hover - thrust;\n  T*der(w) = K*thrust - w;\n  climb = w;\nend Drone;\n",
+    );
+    assert_eq!(effects(&said), ["input_saturation"], "{}", said["summary"]);
+    let [lower, upper] = ["lower", "L"].map(|n| number(&said, 0, &format!("input_saturation_{n}")));
+    assert!(
+        (lower - 41.0).abs() < 0.3 && (upper - 61.0).abs() < 0.3,
+        "{lower} {upper}"
+    );
+}

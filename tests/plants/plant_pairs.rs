@@ -123,3 +123,33 @@ fn an_effect_that_says_little_alone_is_proven_beside_a_second() {
     );
     assert_eq!(said["verdict"], "named", "{}", said["summary"]);
 }
+
+/// An amplifier that does nothing below a small command, and no more above a large one: both are forms of the input's curve, and
+/// neither is what the other leaves.
+#[test]
+fn a_dead_zone_and_a_limit_may_be_of_one_input() {
+    let command = levels(15, -250.0, 250.0);
+    let log = recorded(
+        "command,speed",
+        (1500, 0.02),
+        &[&command],
+        |x, u, _| {
+            let acts = (u[0].abs() - 35.0).clamp(0.0, 125.0) * u[0].signum();
+            vec![(9.0 * acts - x[0]) / 0.12]
+        },
+        (&[0.0], &[(0, 15.0)]),
+    );
+    let said = explained(
+        &Folder::new(),
+        &log,
+        "model Wheel\n  parameter Real K(unit=\"1/min\", min=2, max=20) = 6;\n  parameter Real tau(unit=\"s\", min=0.05, max=0.5) = 0.2;\n  input Real command;\n  output Real speed(unit=\"1/min\");\n  Real w(unit=\"1/min\", start=0);\nequation\n  tau*der(w) = K*command - w;\n  speed = w;\nend Wheel;\n",
+    );
+    let mut names = effects(&said);
+    names.sort_unstable();
+    assert_eq!(
+        names,
+        ["input_dead_zone", "input_saturation"],
+        "{}",
+        said["summary"]
+    );
+}

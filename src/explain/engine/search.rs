@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::fitting::edit::Place;
 use super::fitting::eliminate::alone;
 use super::fitting::fitted::{Fitted, TIE, with_more};
 use super::fitting::second_effect::{determined, differs};
@@ -277,13 +278,19 @@ pub(crate) fn search(
     };
     // Little beside a large effect is what its formula leaves, as in `decide`.
     let little_left = chance(strongest) * tests as f64 > LEFT || strongest < SECOND.1 * first.gain;
-    if little_left || first.hypothesis.is_some() {
+    // A curve of an input may be that of two effects: its middle and its ends.
+    let of_input = |f: &Fitted| matches!(f.lead.place, Place::Input(_));
+    let is_input_curve = of_input(first) && named(&plant.spec, first) == "law";
+    if little_left && !is_input_curve || first.hypothesis.is_some() {
         return Ok(found);
     }
     // One term may do some of the work of two, each of which does less alone.
     let of_term = |f: &Fitted| named(&plant.spec, f);
     let same = |f: &Fitted| family(of_term(f)) == family(of_term(first));
-    let least = NEEDED.max(IMITATED * first.gain);
+    let least = match is_input_curve {
+        true => NEEDED,
+        false => NEEDED.max(IMITATED * first.gain),
+    };
     let proven = |f: &Fitted| f.gain > least && f.hypothesis.is_none();
     let proven_ids = found.steps[0].iter().filter(|f| proven(f)).map(of_term);
     let special_cases: Vec<&str> = proven_ids.filter_map(special_case).collect();
@@ -293,8 +300,14 @@ pub(crate) fn search(
         // A special case may show what it gains only beside the second.
         let as_special_case = special_cases.contains(&of_term(other)) && other.hypothesis.is_none();
         let as_other = proven(other) && of_term(other) != "law" && terms.len() < OTHER_FIRSTS;
+        // Of effects of one family the likeliest has found what is beside them.
+        let begun = pairs.iter().filter_map(|p| p.steps[0].first());
+        let again = begun
+            .map(of_term)
+            .any(|id| family(id) == family(of_term(other)));
         let new = !same(other) && !terms.contains(&other.lead.term.id);
-        if !(new && (as_special_case || as_other)) {
+        let of_the_curve = !little_left || of_input(other);
+        if !(new && of_the_curve && (as_special_case || as_other && !again)) {
             continue;
         }
         terms.push(other.lead.term.id);
@@ -305,13 +318,12 @@ pub(crate) fn search(
             strongest: found.tests[0],
             map: found.map.clone(),
         };
-        pairs.extend(forward(Some(&found.baseline), Some(step)).ok());
+        let pair = forward(Some(&found.baseline), Some(step)).ok();
+        pairs.extend(pair.filter(|p| p.accepted > 1));
     }
     let gain = found.gain();
     let least = gain + TIE.0.max(TIE.1 * gain);
-    let pairs = pairs
-        .into_iter()
-        .filter(|p| p.accepted > 1 && p.gain() > least);
+    let pairs = pairs.into_iter().filter(|p| p.gain() > least);
     let best = pairs.max_by(|a, b| a.gain().total_cmp(&b.gain()));
     let estimator = match objective {
         Objective::FreeRun => Estimator::FreeRun,
@@ -469,8 +481,21 @@ fn forward(
         // What may not be named beside the first, but gains more, may stand in its place.
         let instead = |f: &&Fitted| may_drop && first.is_some_and(|first| f.gain > first.gain);
         let best = fitted.first().filter(|f| new(f) || instead(f));
+        // Of a second effect that is small beside a large first one, blocks left out say whether it is what the formula of the first
+        // leaves.
+        let shows = |f: &Fitted| {
+            let runs = |plant: &Plant, fit: &Fit| {
+                held_out(plant, fit, Estimator::FreeRun, recordings, hold)
+            };
+            let is_more = count > 0 && f.gain > SECOND.0 && new(&f);
+            is_more
+                && runs(&f.candidate.plant, &f.fit).is_some_and(|with| {
+                    let removed = |without| with.removed(&without) >= EXPLAINED;
+                    with.follows_closely() && runs(&now, &fit).is_some_and(removed)
+                })
+        };
         let accepted = best
-            .filter(|f| (f.gain > needed || f.explains) && count < MOST)
+            .filter(|f| (f.gain > needed || f.explains || shows(f)) && count < MOST)
             .cloned();
         let half_way = |f: &&Fitted| {
             count == 0 && f.hypothesis.is_none() && (f.gain > HALF_WAY * NEEDED || !is_new)

@@ -14,6 +14,7 @@ mod where_to_look;
 mod within_bounds;
 
 pub(crate) use plant_effects::spoken;
+pub(crate) use plant_summary::says_that_nothing_is_missing;
 pub(crate) use question::Origin;
 pub use question::{PlantOptions, PlantQuestionError};
 pub use simulate_explained::{AugmentedPlantError, Original};

@@ -199,6 +199,13 @@ impl Answer<'_> {
     }
 }
 
+const NOTHING_MISSING: &str = "nothing is missing in them.";
+
+/// Whether a line of a summary says so.
+pub(crate) fn says_that_nothing_is_missing(line: &str) -> bool {
+    line.ends_with(NOTHING_MISSING)
+}
+
 /// What is said where no effect is found.
 fn nothing_missing(told: &Told, at_bound: bool, hidden: bool) -> Vec<String> {
     let with = match told.differs {
@@ -237,7 +244,7 @@ fn nothing_missing(told: &Told, at_bound: bool, hidden: bool) -> Vec<String> {
     } else if told.verdict == Verdict::Consistent {
         format!("The equations explain the recording with {with}; residuals are white.")
     } else {
-        format!("The equations explain the recording with {with}; nothing is missing in them.")
+        format!("The equations explain the recording with {with}; {NOTHING_MISSING}")
     }];
     if let Differs::Together(test) = told.differs {
         let correlated = match test.largest_correlation {

@@ -21,9 +21,14 @@ use super::engine::terms::documentation::plant_effect;
 use super::engine::thresholds::NEEDED;
 use super::explanation::{EffectFound, Evidence, Explanation, ParameterChange, Quantity, Verdict};
 use super::linear::check::Checked;
-use super::plant_answer::{Origin, PlantOptions, explain_equations, spoken};
+use super::plant_answer::{
+    Origin, PlantOptions, explain_equations, says_that_nothing_is_missing, spoken,
+};
 use crate::physics::Hold;
 use crate::physics::estimate::PlantRecording;
+
+/// A parameter that is so many standard deviations from 0 is determined.
+const DETERMINED: f64 = 3.0;
 
 /// A plant in equations with one input and one output.
 struct Structure {
@@ -117,6 +122,9 @@ pub(crate) fn explain_structure(
     let explained = both.into_iter().flatten().filter_map(|(s, started)| {
         let mut explanation = explain(&started, checked, without)?;
         if let Some(lacks) = &s.lacks {
+            if !lacks.are_determined(&explanation.parameters) {
+                return None;
+            }
             lacks.add_to(&mut explanation, &marks, linear_error);
         }
         Some(explanation)
@@ -131,8 +139,8 @@ pub(crate) fn explain_structure(
         || "the simulation, which is unstable".to_owned(),
         |l| {
             format!(
-                "the linear simulation, with which {:.1} % was reached",
-                l.fit.train.augmented.fit_percent
+                "the linear simulation, with which {:.1} % is reached with other parameters",
+                l.fit.train.parameters_only.fit_percent
             )
         },
     );
@@ -165,15 +173,29 @@ fn explain(started: &Started, checked: &Checked, without: &[String]) -> Option<E
 }
 
 impl Lacks {
+    /// Whether the recording determines its parameters: others would do as well, and with them another plant.
+    fn are_determined(&self, parameters: &[ParameterChange]) -> bool {
+        let mut own = parameters
+            .iter()
+            .filter(|p| self.parameters.contains(&p.name.as_str()));
+        own.all(|p| {
+            p.std
+                .is_some_and(|std| p.recording.abs() > DETERMINED * std)
+        })
+    }
+
     /// What the equations have from the start is an effect beside a linear model, unless they leave something unexplained.
     fn add_to(&self, explanation: &mut Explanation, marks: &Marks, linear_error: f64) {
         if explanation.verdict == Verdict::Unexplained {
             return;
         }
-        explanation.verdict = match explanation.verdict {
-            Verdict::Family => Verdict::Family,
-            _ => Verdict::Named,
-        };
+        if !matches!(explanation.verdict, Verdict::Named | Verdict::Family) {
+            // That nothing else is missing is said of these equations, not of the simulation.
+            explanation.verdict = Verdict::Named;
+            explanation
+                .summary
+                .retain(|line| !says_that_nothing_is_missing(line));
+        }
         let of_it = |p: &&ParameterChange| self.parameters.contains(&p.name.as_str());
         let quantity = |p: &ParameterChange| Quantity {
             value: p.recording,

@@ -11,6 +11,7 @@ use crate::explain::engine::screening::curve::Curve;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::TERMS;
+use crate::explain::engine::terms::richer::richer;
 use crate::explain::engine::terms::term::{Needs, Port, Starts, Term, curve, shape};
 use crate::explain::engine::terms::values::{Instance, evaluate, grid};
 use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH};
@@ -173,13 +174,16 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
     let at = best.lead.argument?;
     let argument = &arguments[at];
     let in_equation = matches!(best.lead.place, Place::Equation(_));
-    let listed = TERMS.iter().filter(|term| {
-        let is_function = term.memories.is_empty() && term.free_strength;
+    // Of an input also limits and dead zones whose sides differ: a curve of it has both sides already.
+    let richer_ones = TERMS.iter().filter(|term| term.port == Port::Input);
+    let richer_ones = richer_ones.flat_map(richer);
+    let listed = TERMS.iter().chain(richer_ones).filter(|term| {
+        let is_function = term.memories.is_empty() && !term.form.contains("delay(");
         let another = *term != best.lead.term;
         let at_place = match best.lead.place {
-            Place::Equation(_) => term.port == Port::Equation,
-            Place::Parameter(_) => term.port == Port::Parameter,
-            Place::Input(_) => false,
+            Place::Equation(_) => term.port == Port::Equation && term.free_strength,
+            Place::Parameter(_) => term.port == Port::Parameter && term.free_strength,
+            Place::Input(_) => term.port == Port::Input,
         };
         is_function && another && at_place && argument.serves(term.needs)
     });
@@ -226,7 +230,10 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
         let near = Near {
             term: instance.term,
             shapes: instance.shapes,
-            strength: regression[2],
+            strength: match instance.term.free_strength {
+                true => regression[2],
+                false => 1.0,
+            },
             slope: regression[1],
             left,
         };

@@ -27,8 +27,21 @@ pub(in crate::explain::engine) fn differs(
     let repeats =
         !depends.is_empty() && depends == first.depends && kind(port) == kind(first.lead.term.port);
     !matches!(id, "law" | "cross_coupling" | "viscous_friction")
-        && family(id) != family(its_id)
-        && !repeats
+        && (are_apart(id, its_id) || family(id) != family(its_id) && !repeats)
+}
+
+/// Effects of one variable that act at opposite ends of it, and often together: the middle and the ends of an input, the road load of
+/// what coasts.
+const APART: [[&str; 2]; 3] = [
+    ["input_dead_zone", "input_saturation"],
+    ["coulomb_friction", "quadratic_drag"],
+    ["stribeck_friction", "quadratic_drag"],
+];
+
+fn are_apart(one: &str, other: &str) -> bool {
+    APART
+        .iter()
+        .any(|pair| *pair == [one, other] || *pair == [other, one])
 }
 
 /// Whether the strength of a term differs from 0 by more than the parameters leave open.

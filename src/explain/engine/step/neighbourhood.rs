@@ -13,10 +13,7 @@ use crate::explain::engine::fitting::refined_curve::refined_curve;
 use crate::explain::engine::hypothesis::Ground;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::names::named;
-use crate::explain::engine::thresholds::FINISHED;
-
-/// Part of the best gain that a term has whose richer forms are tried.
-const RICHER: f64 = 0.5;
+use crate::explain::engine::thresholds::{FINISHED, IMITATED};
 
 fn best_gain(fitted: &[Fitted]) -> f64 {
     fitted.iter().map(|f| f.gain).fold(0.0, f64::max)
@@ -55,7 +52,7 @@ pub(super) fn add_neighbours(
     (stage, ground): (&Stage, &Ground),
 ) -> Vec<Fitted> {
     let best = best_gain(&fitted);
-    let of_library = |f: &&mut Fitted| f.hypothesis.is_none() && f.gain > RICHER * best;
+    let of_library = |f: &&mut Fitted| f.hypothesis.is_none() && f.gain > IMITATED * best;
     let mut best_first: Vec<&mut Fitted> = fitted.iter_mut().filter(of_library).collect();
     best_first.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     for (rank, one) in best_first.into_iter().take(FINISHED).enumerate() {

@@ -14,7 +14,7 @@ enum Kind {
     Velocity,
     Temperature,
     Other,
-    /// Nothing in the plant has a unit: it is what the effect needs.
+    /// It has no unit: it is what the effect needs.
     Unknown,
 }
 
@@ -50,7 +50,7 @@ fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
         Kind::Position
     } else if all(&|v| matches!(unit(v), "K" | "degC")) {
         Kind::Temperature
-    } else if !variables.is_empty() && is_without_units(spec) {
+    } else if all(&|v| spec.variable(v).unit_text.is_none()) {
         Kind::Unknown
     } else {
         Kind::Other
@@ -162,7 +162,8 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
         id => id,
     };
     // Values of the fit decide between names of one term.
-    let fastest = found.range.0.abs().max(found.range.1.abs());
+    let (from, to) = found.range;
+    let fastest = from.abs().max(to.abs());
     match (id, found.shapes.first()) {
         // What is always the same, and drives.
         ("coulomb_friction" | "leak", _) if is_constant(term) && found.strength() > 0.0 => {
@@ -173,6 +174,11 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
             if may_be_velocity(spec, &variables) && slip < YIELDS * found.travel =>
         {
             "coulomb_friction"
+        }
+        ("cogging", Some(&wave_number))
+            if (wave_number * (to - from)).abs() < PERIODS * std::f64::consts::TAU =>
+        {
+            "law"
         }
         // A wire that warms up conducts worse.
         ("temperature_dependent_resistance", _)
@@ -258,6 +264,9 @@ pub(in crate::explain::engine) fn special_case(id: &str) -> Option<&'static str>
         _ => None,
     }
 }
+
+/// Fewer periods in a travel are a curve: up to here a wave turns twice, as a cubic does.
+const PERIODS: f64 = 1.5;
 
 /// Bristles that yield within this part of the travel are dry friction.
 const YIELDS: f64 = 0.12;

@@ -45,7 +45,7 @@ impl Answer<'_> {
             .filter(|(list, stds)| {
                 list.iter()
                     .zip(stds)
-                    .any(|(now, std)| moved(&before, now, *std))
+                    .any(|(now, std)| std.is_some() && moved(&before, now, *std))
             });
         let (listed, stds) = all.unwrap_or((listed, stds));
         let changed = listed.iter().zip(&stds);

@@ -43,7 +43,7 @@ const MOSTLY_FREE: f64 = 0.5;
 const RESONANT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Fewer periods in a recording are a trend and no periodic disturbance, and fewer in a travel are a curve and no cogging.
-const FEWEST_PERIODS: f64 = 2.0;
+pub(crate) const FEWEST_PERIODS: f64 = 2.0;
 
 /// A typical speed of the signal that effect `index` looks at.
 pub(crate) fn speed_scale(problem: &Problem, fit: &Fit, index: usize) -> f64 {

@@ -3,6 +3,7 @@
 
 use super::windows::{Reading, Windows, quantile};
 use crate::explain::effects::{self, Definition, decay};
+use crate::explain::linear::search::plausibility::FEWEST_PERIODS;
 
 /// Cogging pitches that are tried over the range of motion.
 const PITCHES: usize = 80;
@@ -91,7 +92,7 @@ impl Form {
                 let range = quantile(all(), 1.0) - quantile(all(), 0.0);
                 // A pitch that is passed within half a window is averaged away.
                 let shortest = 2.0 * windows.quick * windows.half as f64 * step;
-                let (low, high) = (shortest.min(0.3 * range), range);
+                let (low, high) = (shortest.min(0.3 * range), range / FEWEST_PERIODS);
                 (0..PITCHES)
                     .map(|i| low * (high / low).powf(i as f64 / (PITCHES - 1) as f64))
                     .collect()
