@@ -1,6 +1,7 @@
 //! Which of two explanations of simulated columns is given, and what is taken back where the simulator is not understood.
 
 use super::explanation::{Explanation, SignalTraces, Verdict};
+use super::linear::answer::probability::UNLIKELY;
 use crate::noise::{Mask, effective_samples};
 
 /// An effect beside a simulator that is neither linear nor reproduced by equations must take this part off the mean square of the
@@ -76,13 +77,13 @@ pub(crate) fn unless_refuted(mut explanation: Explanation) -> Explanation {
     explanation
 }
 
-/// Whether an explanation relative to a linear simulator needs no second opinion: it found nothing, or a listed effect that is more
-/// likely right than wrong, or a law of outputs without units, whose name depends on these.
+/// Whether an explanation relative to a linear simulator needs no second opinion: it found nothing, or a listed effect that is not
+/// [`UNLIKELY`], or a law of outputs without units, whose name depends on these.
 pub(crate) fn is_sure(explanation: &Explanation, has_units: bool) -> bool {
     match explanation.verdict {
         Verdict::Consistent | Verdict::Parameters => true,
         Verdict::Named | Verdict::Family if is_law(explanation) => !has_units,
-        Verdict::Named | Verdict::Family => explanation.probability > 0.5,
+        Verdict::Named | Verdict::Family => explanation.probability > UNLIKELY,
         Verdict::Unexplained => false,
     }
 }

@@ -53,7 +53,7 @@ const MOST_NOISE: f64 = 0.1;
 const MOST: f64 = 0.99;
 
 /// Probability below which a name is not given: two of three such names are wrong.
-const UNLIKELY: f64 = 1.0 / 3.0;
+pub(crate) const UNLIKELY: f64 = 1.0 / 3.0;
 
 /// Whether a name is more than twice as likely wrong as right. The regression holds no drives by their averaged equation.
 pub(crate) fn is_unlikely(finding: &Finding) -> bool {
