@@ -83,8 +83,9 @@ pub(super) fn named_alone(
 mod tests {
     use super::*;
     use crate::explain::engine::fitting::fitted::Fitted;
+    use crate::explain::engine::pairs::search;
     use crate::explain::engine::scope::Scope;
-    use crate::explain::engine::search::{Objective, search};
+    use crate::explain::engine::search::{Objective, Question};
     use crate::physics::estimate::Fit;
     use crate::physics::{Plant, parse};
 
@@ -134,8 +135,14 @@ end Cart;
     /// The best of one kind in this plant, and what the search for it has found.
     fn best(plant: &Plant, recordings: &[PlantRecording], id: &str) -> (Fitted, Found) {
         let scope = Scope::new(&[id.to_owned()], &[]).unwrap();
-        let objective = Objective::Likelihood;
-        let found = search(plant, recordings, Hold::Zero, &scope, objective, None).unwrap();
+        let question = Question {
+            plant,
+            recordings,
+            hold: Hold::Zero,
+            scope: &scope,
+            objective: Objective::Likelihood,
+        };
+        let found = search(question, None).unwrap();
         (found.steps[0][0].clone(), found)
     }
 

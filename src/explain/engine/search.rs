@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::fitting::edit::Place;
 use super::fitting::eliminate::alone;
 use super::fitting::fitted::{Fitted, TIE, with_more};
 use super::fitting::second_effect::{determined, differs};
@@ -12,11 +11,9 @@ use super::long_recordings::Searched;
 use super::scope::Scope;
 use super::screening::along::range_along;
 use super::step::{Stage, Step, improved, step};
-use super::terms::names::{family, named, special_case};
+use super::terms::names::named;
 use super::terms::term::Needs;
-use super::thresholds::{
-    BETTER_FITS, FINISHED, IMITATED, LEFT, MOST, NEEDED, SECOND, SURE, chance,
-};
+use super::thresholds::{BETTER_FITS, FINISHED, LEFT, MOST, NEEDED, SECOND, SURE, chance};
 use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{EstimateError, EstimateOptions, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, ModelSpec, Plant};
@@ -63,6 +60,26 @@ pub(crate) enum Objective {
     Likelihood,
     /// The mean square of the error of the free run, with as many values as are independent.
     FreeRun,
+}
+
+/// What the equations of a plant leave out of recordings.
+#[derive(Clone, Copy)]
+pub(crate) struct Question<'a> {
+    pub(crate) plant: &'a Plant,
+    pub(crate) recordings: &'a [PlantRecording],
+    pub(crate) hold: Hold,
+    pub(crate) scope: &'a Scope,
+    pub(crate) objective: Objective,
+}
+
+impl Objective {
+    /// How blocks left out are judged.
+    pub(super) fn estimator(self) -> Estimator {
+        match self {
+            Self::FreeRun => Estimator::FreeRun,
+            Self::Likelihood => Estimator::Likelihood,
+        }
+    }
 }
 
 impl Found {
@@ -254,105 +271,22 @@ fn without_first(
     (both - alone.gain < needed).then_some(alone)
 }
 
-/// Other first effects beside which a second is looked for, where what was found leaves structure.
-const OTHER_FIRSTS: usize = 4;
-
-/// What the equations leave out. The fit of the plant alone may be known.
+/// Forward selection, from the fit of the plant alone and the first step where these are known.
 ///
 /// # Errors
 /// As those of an estimation.
-pub(crate) fn search(
-    plant: &Plant,
-    recordings: &[PlantRecording],
-    hold: Hold,
-    scope: &Scope,
-    objective: Objective,
-    known: Option<&Fit>,
-) -> Result<Found, EstimateError> {
-    let forward = |known, begun| forward(plant, recordings, hold, scope, objective, known, begun);
-    let found = forward(known, None)?;
-    let (strongest, tests) = found.left();
-    let all = found.steps.first().filter(|_| found.accepted > 0);
-    let Some([first, others @ ..]) = all.map(Vec::as_slice) else {
-        return Ok(found);
-    };
-    // Little beside a large effect is what its formula leaves, as in `decide`.
-    let little_left = chance(strongest) * tests as f64 > LEFT || strongest < SECOND.1 * first.gain;
-    // A curve of an input may be that of two effects: its middle and its ends.
-    let of_input = |f: &Fitted| matches!(f.lead.place, Place::Input(_));
-    let is_input_curve = of_input(first) && named(&plant.spec, first) == "law";
-    if little_left && !is_input_curve || first.hypothesis.is_some() {
-        return Ok(found);
-    }
-    // One term may do some of the work of two, each of which does less alone.
-    let of_term = |f: &Fitted| named(&plant.spec, f);
-    let same = |f: &Fitted| family(of_term(f)) == family(of_term(first));
-    let least = match is_input_curve {
-        true => NEEDED,
-        false => NEEDED.max(IMITATED * first.gain),
-    };
-    let proven = |f: &Fitted| f.gain > least && f.hypothesis.is_none();
-    let proven_ids = found.steps[0].iter().filter(|f| proven(f)).map(of_term);
-    let special_cases: Vec<&str> = proven_ids.filter_map(special_case).collect();
-    let mut terms: Vec<&str> = Vec::new();
-    let mut pairs: Vec<Found> = Vec::new();
-    for (i, other) in others.iter().enumerate() {
-        // A special case may show what it gains only beside the second.
-        let as_special_case = special_cases.contains(&of_term(other)) && other.hypothesis.is_none();
-        let as_other = proven(other) && of_term(other) != "law" && terms.len() < OTHER_FIRSTS;
-        // Of effects of one family the likeliest has found what is beside them.
-        let begun = pairs.iter().filter_map(|p| p.steps[0].first());
-        let again = begun
-            .map(of_term)
-            .any(|id| family(id) == family(of_term(other)));
-        let new = !same(other) && !terms.contains(&other.lead.term.id);
-        let of_the_curve = !little_left || of_input(other);
-        if !(new && of_the_curve && (as_special_case || as_other && !again)) {
-            continue;
-        }
-        terms.push(other.lead.term.id);
-        let mut fitted = [std::slice::from_ref(first), others].concat();
-        fitted[..=i + 1].rotate_right(1);
-        let step = Step {
-            fitted,
-            strongest: found.tests[0],
-            map: found.map.clone(),
-        };
-        let pair = forward(Some(&found.baseline), Some(step)).ok();
-        pairs.extend(pair.filter(|p| p.accepted > 1));
-    }
-    let gain = found.gain();
-    let least = gain + TIE.0.max(TIE.1 * gain);
-    let pairs = pairs.into_iter().filter(|p| p.gain() > least);
-    let best = pairs.max_by(|a, b| a.gain().total_cmp(&b.gain()));
-    let estimator = match objective {
-        Objective::FreeRun => Estimator::FreeRun,
-        Objective::Likelihood => Estimator::Likelihood,
-    };
-    let errors = |of: &Found| held_out(&of.plant, &of.fit, estimator, recordings, hold);
-    let follows = |pair: &Found| {
-        let both = errors(pair).zip(errors(&found));
-        both.is_some_and(|(pair, single)| pair.over(&single) < 1.0)
-    };
-    match best.filter(follows) {
-        Some(pair) => Ok(Found {
-            is_pair: true,
-            ..pair
-        }),
-        None => Ok(found),
-    }
-}
-
-/// Forward selection, from the fit of the plant alone and the first step where these are known.
-fn forward(
-    plant: &Plant,
-    recordings: &[PlantRecording],
-    hold: Hold,
-    scope: &Scope,
-    objective: Objective,
+pub(super) fn forward(
+    question: Question,
     known: Option<&Fit>,
     mut begun: Option<Step>,
 ) -> Result<Found, EstimateError> {
+    let Question {
+        plant,
+        recordings,
+        hold,
+        scope,
+        objective,
+    } = question;
     let least_squares = objective == Objective::FreeRun;
     let mut options = EstimateOptions {
         free: vec![true; plant.spec.parameters().len()],
@@ -443,10 +377,7 @@ fn forward(
             }
         };
         if accepted_so_far == 1 && chance(strongest.0) * (strongest.1 as f64) < LEFT {
-            let estimator = match least_squares {
-                true => Estimator::FreeRun,
-                false => Estimator::Likelihood,
-            };
+            let estimator = objective.estimator();
             if let Some(term) = named_for_curve(&plant.spec, &steps[0], estimator, recordings, hold)
             {
                 options.free.truncate(plant.spec.parameters().len());

@@ -13,8 +13,9 @@ use crate::explain::engine::holdout::{
 use crate::explain::engine::long_recordings::part;
 use crate::explain::engine::misled::{integrates, reacting_inputs};
 use crate::explain::engine::named_alone::named_alone;
+use crate::explain::engine::pairs::search;
 use crate::explain::engine::scope::Scope;
-use crate::explain::engine::search::{Found, Objective, search};
+use crate::explain::engine::search::{Found, Objective, Question};
 use crate::explain::engine::terms::names::named;
 use crate::explain::engine::thresholds::{MOST_STEPS, SECOND, chance, limited};
 use crate::physics::estimate::{EstimateError, Fit, Form, PlantRecording, Study};
@@ -89,7 +90,14 @@ fn decide(
     hold: Hold,
     scope: &Scope,
 ) -> Result<Found, EstimateError> {
-    let mut likely = search(plant, recordings, hold, scope, Objective::Likelihood, None)?;
+    let question = |objective: Objective| Question {
+        plant,
+        recordings,
+        hold,
+        scope,
+        objective,
+    };
+    let mut likely = search(question(Objective::Likelihood), None)?;
     let mut rivals = rivals(&likely, 0, recordings, hold);
     let Some(without) = best(&rivals, |r| r.accepted == 0) else {
         return Ok(likely);
@@ -132,8 +140,7 @@ fn decide(
             .iter()
             .find(|r| r.accepted == 0 && r.estimator == Estimator::FreeRun)
             .map(|r| r.nearest.as_ref().unwrap_or(&r.fit).clone());
-        let free_run = Objective::FreeRun;
-        if let Ok(found) = search(plant, recordings, hold, scope, free_run, known.as_ref()) {
+        if let Ok(found) = search(question(Objective::FreeRun), known.as_ref()) {
             rivals.extend(self::rivals(&found, 1, recordings, hold));
             searches.push(found);
         }

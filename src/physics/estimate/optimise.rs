@@ -55,11 +55,6 @@ pub(super) const RIDGE: f64 = 1e-10;
 const DAMPING: f64 = 1e-3;
 const LESS: f64 = 0.2;
 const MORE: f64 = 5.0;
-const MOST_MORE: f64 = 1e3;
-/// Part of the foretold decrease from which on the quadratic model is good, and damping falls, and up to which it is poor, and
-/// damping grows (Nocedal and Wright, *Numerical Optimization*, algorithm 4.1).
-const GOOD: f64 = 0.75;
-const POOR: f64 = 0.25;
 /// ... with approximate derivatives: where these lead nowhere, exact ones are better than more damping.
 const APPROXIMATE_ATTEMPTS: usize = 3;
 /// Attempts at one step of a search that should end at a minimum.
@@ -104,18 +99,11 @@ pub(super) fn minimise(
             }
             match objective.deviance(&trial) {
                 Some(now) if now < deviance => {
-                    match (deviance - now) / foretold {
-                        part if part > GOOD => damping = (damping * LESS).max(1e-12),
-                        part if part < POOR => damping *= MORE,
-                        _ => {}
-                    }
                     *point = trial;
                     deviance = now;
+                    damping = (damping * LESS).max(1e-12);
                     moved = true;
                     break;
-                }
-                Some(now) if now.is_finite() => {
-                    damping *= shorter(&descent, point, &trial, now - deviance);
                 }
                 _ => damping *= MORE,
             }
@@ -135,13 +123,6 @@ pub(super) fn minimise(
 fn foretold(curvature: &DMatrix<f64>, descent: &DVector<f64>, from: &[f64], to: &[f64]) -> f64 {
     let step = DVector::from_iterator(from.len(), to.iter().zip(from).map(|(t, f)| t - f));
     2.0 * descent.dot(&step) - step.dot(&(curvature * &step))
-}
-
-/// By how much more a step is damped that raised the deviance: as the parabola through both has its minimum before it.
-fn shorter(descent: &DVector<f64>, from: &[f64], to: &[f64], raised: f64) -> f64 {
-    let step = DVector::from_iterator(from.len(), to.iter().zip(from).map(|(t, f)| t - f));
-    let fall = 2.0 * descent.dot(&step);
-    (2.0 * (raised + fall) / fall).clamp(MORE, MOST_MORE)
 }
 
 /// The damped step. What is at a bound and would leave it is held there, and nothing moves further than its reach.

@@ -445,7 +445,10 @@ mod tests {
             .iter_mut()
             .for_each(|a| a.set(vec![wave.clone()], vec![wave.clone()]));
         let place = Place::Equation(sensors(&spec)[0]);
-        for (id, shapes) in [("sensor_lag", vec![0.02]), ("sensor_saturation", vec![9.0])] {
+        for (id, shapes) in [
+            ("sensor_lag", vec![0.02]),
+            ("sensor_saturation", vec![-9.0, 9.0]),
+        ] {
             let term = TERMS.iter().find(|t| t.id == id).unwrap();
             let mut lead = Lead::untested(term, place).at(place, Some(0), &shapes);
             lead.sensor = true;

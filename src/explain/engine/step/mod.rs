@@ -8,8 +8,9 @@ mod promising;
 use self::candidates::Candidates;
 use self::neighbourhood::{add_formulas, add_neighbours};
 use self::origins::Origins;
+use super::fitting::edit::Place;
 use super::fitting::finish::finished;
-use super::fitting::fitted::{Fitted, TIE, order};
+use super::fitting::fitted::{Fitted, order};
 use super::fitting::formulas::FORMULA;
 use super::hypothesis::{Ground, Trial, trials};
 use super::scope::Scope;
@@ -60,29 +61,21 @@ pub(super) fn improved(stage: &Stage, fitted: &[Fitted]) -> Option<Fit> {
         .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
 }
 
-/// Of fits of one term, from several starts or in several forms, the best, or one with fewer shapes that is as good; best first. Each
-/// formula is a term of its own.
+/// Of fits of one term, from several starts or in several forms, the best; best first. Each formula is a term of its own.
 fn drop_repeated(mut fitted: Vec<Fitted>) -> Vec<Fitted> {
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let key = |f: &Fitted| {
+    let mut known: Vec<(&str, Place, String, Option<usize>)> = Vec::new();
+    fitted.retain(|f| {
         let term = match f.lead.term {
             term if term.id == FORMULA => term.form,
             term => term.id,
         };
-        (term, f.lead.place, f.argument.clone(), f.hypothesis)
-    };
-    let mut kept: Vec<Fitted> = Vec::new();
-    for f in fitted {
-        match kept.iter_mut().find(|k| key(k) == key(&f)) {
-            None => kept.push(f),
-            Some(best) if f.shapes.len() < best.shapes.len() && f.gain > best.gain - TIE.0 => {
-                *best = f;
-            }
-            Some(_) => {}
-        }
-    }
-    kept.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    kept
+        let this = (term, f.lead.place, f.argument.clone(), f.hypothesis);
+        let new = !known.contains(&this);
+        known.push(this);
+        new
+    });
+    fitted
 }
 
 /// Fits the leads of a plant.

@@ -36,17 +36,6 @@ pub(super) const UPPER_LIMIT: Shape = shape("L", Starts::Quantiles(&[0.6, 0.8, 0
 pub(super) const STOP: Shape = shape("o", Starts::Releases(&[0.03, 0.1]), true);
 pub(super) const HYSTERESIS: Shape = shape("w", Starts::Spread(&[0.1, 0.3, 1.0]), true);
 
-/// Limits of a sensor, and what it shows within them.
-pub(super) const SENSOR_UPPER: Shape = shape("upper", Starts::Quantiles(&[0.97, 0.9]), false);
-pub(super) const SENSOR_LOWER: Shape = shape("lower", Starts::Quantiles(&[0.03, 0.1]), false);
-pub(super) const fn sensor_limit(form: &'static str, shapes: &'static [Shape]) -> Term {
-    Term {
-        free_strength: false,
-        symbol: "",
-        ..curve("sensor_saturation", Sensor, Anything, form, shapes)
-    }
-}
-
 /// Hysteresis of an input with these memories.
 pub(super) const fn hysteresis(memories: &'static [Memory], shapes: &'static [Shape]) -> Term {
     Term {
@@ -517,8 +506,20 @@ pub(crate) const TERMS: &[Term] = &[
         symbol: "",
         units: &[],
     },
-    sensor_limit("min({z}, {upper}) - {z}", &[SENSOR_UPPER]),
-    sensor_limit("max({z}, {lower}) - {z}", &[SENSOR_LOWER]),
+    Term {
+        id: "sensor_saturation",
+        port: Sensor,
+        needs: Anything,
+        form: "min(max({z}, {lower}), {upper}) - {z}",
+        memories: &[],
+        shapes: &[
+            shape("lower", Starts::Quantiles(&[0.03, 0.1, 0.0]), false),
+            shape("upper", Starts::Quantiles(&[0.97, 0.9, 1.0]), false),
+        ],
+        free_strength: false,
+        symbol: "",
+        units: &[],
+    },
 ];
 
 /// Ids of the effects of sensors.

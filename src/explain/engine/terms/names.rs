@@ -176,7 +176,8 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
             "coulomb_friction"
         }
         ("cogging", Some(&wave_number))
-            if (wave_number * (to - from)).abs() < PERIODS * std::f64::consts::TAU =>
+            if (wave_number * (to - from)).abs() < PERIODS * std::f64::consts::TAU
+                && !is_once_a_turn(spec, &variables, wave_number) =>
         {
             "law"
         }
@@ -267,6 +268,17 @@ pub(in crate::explain::engine) fn special_case(id: &str) -> Option<&'static str>
 
 /// Fewer periods in a travel are a curve: up to here a wave turns twice, as a cubic does.
 const PERIODS: f64 = 1.5;
+
+/// Whether a wave is that of gravity, which has a term of its own: with one period in a turn, to a tenth.
+fn is_once_a_turn(spec: &ModelSpec, variables: &[VariableId], wave_number: f64) -> bool {
+    let turn = match variables.first().map(|&v| unit_of(spec, v)) {
+        Some("rad") => 1.0,
+        Some("deg") => std::f64::consts::PI / 180.0,
+        _ if may_be_angle(spec, variables) => 1.0,
+        _ => return false,
+    };
+    (wave_number / turn - 1.0).abs() < 0.1
+}
 
 /// Bristles that yield within this part of the travel are dry friction.
 const YIELDS: f64 = 0.12;

@@ -1,8 +1,8 @@
 //! Forms of terms with one shape more, where their physics has one.
 
 use super::library::{
-    ABOVE, BACKLASH, BELOW, DEAD_ZONE, HYSTERESIS, LIMIT, SENSOR_LOWER, SENSOR_UPPER, STEP,
-    STICTION, STOP, UPPER_LIMIT, hysteresis, sensor_limit,
+    ABOVE, BACKLASH, BELOW, DEAD_ZONE, HYSTERESIS, LIMIT, STEP, STICTION, STOP, UPPER_LIMIT,
+    hysteresis,
 };
 use super::term::Needs::{self, AboutZero, Anything, BothSigns, Time};
 use super::term::Port::{self, Equation, Input, Parameter, Sensor};
@@ -24,8 +24,6 @@ pub(in crate::explain::engine) fn richer(term: &Term) -> &'static [Term] {
         ("input_dead_zone", _) => DEAD_ZONE_OF_TWO,
         ("input_saturation", [LIMIT]) => LIMITS_OF_TWO,
         ("input_saturation", [UPPER_LIMIT]) => UPPER_AND_LOWER,
-        ("sensor_saturation", [SENSOR_UPPER]) => UPPER_AND_LOWER_OF_A_SENSOR,
-        ("sensor_saturation", [SENSOR_LOWER]) => LOWER_AND_UPPER_OF_A_SENSOR,
         ("input_backlash", _) => BACKLASH_LAGGING,
         ("valve_stiction", [_]) => SLIP_LAGGING,
         ("valve_stiction", _) => STICTION_LAGGING,
@@ -157,12 +155,6 @@ const UPPER_AND_LOWER: &[Term] = &[limits(
     Anything,
 )];
 
-const BOTH_LIMITS: &str = "min(max({z}, {lower}), {upper}) - {z}";
-const UPPER_AND_LOWER_OF_A_SENSOR: &[Term] =
-    &[sensor_limit(BOTH_LIMITS, &[SENSOR_UPPER, SENSOR_LOWER])];
-const LOWER_AND_UPPER_OF_A_SENSOR: &[Term] =
-    &[sensor_limit(BOTH_LIMITS, &[SENSOR_LOWER, SENSOR_UPPER])];
-
 const LAG_TIME: Shape = shape("T", Starts::Samples(&[0.3, 1.0]), true);
 /// Follows the second memory.
 const LAG: Memory = Memory {
@@ -227,6 +219,6 @@ mod tests {
             assert_eq!(of(richer), of(simple));
             count += 1;
         }
-        assert_eq!(count, 26);
+        assert_eq!(count, 24);
     }
 }

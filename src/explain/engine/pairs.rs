@@ -1,0 +1,101 @@
+//! Two effects in place of what forward selection has found: one term may do some of the work of two, each of which does less alone.
+
+use super::fitting::edit::Place;
+use super::fitting::fitted::{Fitted, TIE};
+use super::holdout::held_out;
+use super::search::{Found, Question, forward};
+use super::step::Step;
+use super::terms::names::{family, named, special_case};
+use super::thresholds::{IMITATED, LEFT, NEEDED, SECOND, chance};
+use crate::physics::estimate::{EstimateError, Fit};
+
+/// Other first effects beside which a second is looked for, where what was found leaves structure.
+const OTHER_FIRSTS: usize = 4;
+
+/// What the equations leave out. The fit of the plant alone may be known.
+///
+/// # Errors
+/// As those of an estimation.
+pub(crate) fn search(question: Question, known: Option<&Fit>) -> Result<Found, EstimateError> {
+    let found = forward(question, known, None)?;
+    let gain = found.gain();
+    let least = gain + TIE.0.max(TIE.1 * gain);
+    let pairs = pairs(question, &found)
+        .into_iter()
+        .filter(|p| p.gain() > least);
+    let best = pairs.max_by(|a, b| a.gain().total_cmp(&b.gain()));
+    let estimator = question.objective.estimator();
+    let errors = |of: &Found| {
+        let (recordings, hold) = (question.recordings, question.hold);
+        held_out(&of.plant, &of.fit, estimator, recordings, hold)
+    };
+    let follows = |pair: &Found| {
+        let both = errors(pair).zip(errors(&found));
+        both.is_some_and(|(pair, single)| pair.over(&single) < 1.0)
+    };
+    match best.filter(follows) {
+        Some(pair) => Ok(Found {
+            is_pair: true,
+            ..pair
+        }),
+        None => Ok(found),
+    }
+}
+
+/// Pairs that begin with other first effects, where what was found leaves structure or is a curve of an input.
+fn pairs(question: Question, found: &Found) -> Vec<Found> {
+    let spec = &question.plant.spec;
+    let all = found.steps.first().filter(|_| found.accepted > 0);
+    let Some([first, others @ ..]) = all.map(Vec::as_slice) else {
+        return vec![];
+    };
+    // Little beside a large effect is what its formula leaves, as in `decide`.
+    let (strongest, tests) = found.left();
+    let little_left = chance(strongest) * tests as f64 > LEFT || strongest < SECOND.1 * first.gain;
+    // A curve of an input may be that of two effects: its middle and its ends.
+    let of_input = |f: &Fitted| matches!(f.lead.place, Place::Input(_));
+    let is_input_curve = of_input(first) && named(spec, first) == "law";
+    if little_left && !is_input_curve || first.hypothesis.is_some() {
+        return vec![];
+    }
+    let least = match is_input_curve {
+        true => NEEDED,
+        false => NEEDED.max(IMITATED * first.gain),
+    };
+    let id = |f: &Fitted| named(spec, f);
+    let proven = |f: &Fitted| f.gain > least && f.hypothesis.is_none();
+    let proven_ids = found.steps[0].iter().filter(|f| proven(f)).map(id);
+    let special_cases: Vec<&str> = proven_ids.filter_map(special_case).collect();
+    let mut tried: Vec<&str> = Vec::new();
+    let mut pairs: Vec<Found> = Vec::new();
+    for (i, other) in others.iter().enumerate() {
+        let its_family = |f: &Fitted| family(id(f)) == family(id(other));
+        if its_family(first)
+            || tried.contains(&other.lead.term.id)
+            || little_left && !of_input(other)
+        {
+            continue;
+        }
+        // A special case may show what it gains only beside the second.
+        let as_special_case = special_cases.contains(&id(other)) && other.hypothesis.is_none();
+        // Of effects of one family the likeliest has found what is beside them.
+        let again = pairs
+            .iter()
+            .any(|p| p.steps[0].first().is_some_and(its_family));
+        let as_other = proven(other) && id(other) != "law" && tried.len() < OTHER_FIRSTS && !again;
+        if !(as_special_case || as_other) {
+            continue;
+        }
+        tried.push(other.lead.term.id);
+        let mut fitted = [std::slice::from_ref(first), others].concat();
+        fitted[..=i + 1].rotate_right(1);
+        let begun = Step {
+            fitted,
+            strongest: found.tests[0],
+            map: found.map.clone(),
+        };
+        let pair = forward(question, Some(&found.baseline), Some(begun)).ok();
+        pairs.extend(pair.filter(|p| p.accepted > 1));
+    }
+    pairs
+}
