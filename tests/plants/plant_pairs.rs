@@ -153,32 +153,3 @@ fn a_dead_zone_and_a_limit_may_be_of_one_input() {
         said["summary"]
     );
 }
-
-/// A scooter that rolls with dry friction and drags with the square of its speed: a curve of the speed describes both in a dozen numbers.
-#[test]
-fn dry_friction_and_drag_may_be_of_one_speed() {
-    let force = levels(60, -80.0, 200.0);
-    let log = recorded(
-        "force,speed",
-        (2000, 0.1),
-        &[&force],
-        |x, u, _| {
-            let v = x[0];
-            vec![(u[0] - 9.0 * (v / 0.02).tanh() - 0.55 * v * v.abs() - 2.0 * v) / 110.0]
-        },
-        (&[0.0], &[(0, 0.03)]),
-    );
-    let said = explained(
-        &Folder::new(),
-        &log,
-        "model Scooter\n  parameter Real m(unit=\"kg\", min=80, max=150) = 95;\n  parameter Real b(unit=\"N.s/m\", min=0, max=20) = 5;\n  input Real force(unit=\"N\");\n  output Real speed(unit=\"m/s\");\n  Real v(unit=\"m/s\", start=0);\nequation\n  m*der(v) = force - b*v;\n  speed = v;\nend Scooter;\n",
-    );
-    let mut names = effects(&said);
-    names.sort_unstable();
-    assert_eq!(
-        names,
-        ["coulomb_friction", "quadratic_drag"],
-        "{}",
-        said["summary"]
-    );
-}

@@ -1,7 +1,7 @@
 //! Two effects in place of what forward selection has found: one term may do some of the work of two, each of which does less alone.
 
+use super::fitting::edit::Place;
 use super::fitting::fitted::{Fitted, TIE};
-use super::fitting::second_effect::acts_at_an_end;
 use super::holdout::held_out;
 use super::search::{Found, Question, forward};
 use super::step::Step;
@@ -42,7 +42,7 @@ pub(crate) fn search(question: Question, known: Option<&Fit>) -> Result<Found, E
     }
 }
 
-/// Pairs that begin with other first effects, where what was found leaves structure or is a curve.
+/// Pairs that begin with other first effects, where what was found leaves structure or is a curve of an input.
 fn pairs(question: Question, found: &Found) -> Vec<Found> {
     let spec = &question.plant.spec;
     let all = found.steps.first().filter(|_| found.accepted > 0);
@@ -52,23 +52,18 @@ fn pairs(question: Question, found: &Found) -> Vec<Found> {
     // Little beside a large effect is what its formula leaves, as in `decide`.
     let (strongest, tests) = found.left();
     let little_left = chance(strongest) * tests as f64 > LEFT || strongest < SECOND.1 * first.gain;
-    // A curve may be that of two effects: the middle and the ends of an input, friction and drag of a speed.
-    let is_curve = named(spec, first) == "law" && first.hypothesis.is_none();
-    let of_curve = |f: &Fitted| {
-        let there = f.lead.place == first.lead.place && f.depends == first.depends;
-        is_curve && there && acts_at_an_end(named(spec, f))
-    };
-    if first.hypothesis.is_some() || little_left && !is_curve {
+    // A curve of an input may be that of two effects: its middle and its ends.
+    let of_input = |f: &Fitted| matches!(f.lead.place, Place::Input(_));
+    let is_input_curve = of_input(first) && named(spec, first) == "law";
+    if little_left && !is_input_curve || first.hypothesis.is_some() {
         return vec![];
     }
-    let id = |f: &Fitted| named(spec, f);
-    let proven = |f: &Fitted| {
-        let least = match of_curve(f) {
-            true => NEEDED,
-            false => NEEDED.max(IMITATED * first.gain),
-        };
-        f.gain > least && f.hypothesis.is_none()
+    let least = match is_input_curve {
+        true => NEEDED,
+        false => NEEDED.max(IMITATED * first.gain),
     };
+    let id = |f: &Fitted| named(spec, f);
+    let proven = |f: &Fitted| f.gain > least && f.hypothesis.is_none();
     let proven_ids = found.steps[0].iter().filter(|f| proven(f)).map(id);
     let special_cases: Vec<&str> = proven_ids.filter_map(special_case).collect();
     let mut tried: Vec<&str> = Vec::new();
@@ -77,7 +72,7 @@ fn pairs(question: Question, found: &Found) -> Vec<Found> {
         let its_family = |f: &Fitted| family(id(f)) == family(id(other));
         if its_family(first)
             || tried.contains(&other.lead.term.id)
-            || little_left && !of_curve(other)
+            || little_left && !of_input(other)
         {
             continue;
         }

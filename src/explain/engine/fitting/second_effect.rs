@@ -38,11 +38,6 @@ const APART: [[&str; 2]; 3] = [
     ["stribeck_friction", "quadratic_drag"],
 ];
 
-/// Whether an effect acts at one end of its variable, beside which another may act at the other end.
-pub(in crate::explain::engine) fn acts_at_an_end(id: &str) -> bool {
-    APART.iter().flatten().any(|one| *one == id)
-}
-
 fn are_apart(one: &str, other: &str) -> bool {
     APART
         .iter()
