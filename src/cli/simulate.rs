@@ -17,6 +17,9 @@ use crate::log::{
 };
 use crate::report::{is_explanation, parse_explanation, read_model};
 
+/// Samples of a simulation that each state of its start is estimated from.
+const SAMPLES_A_STATE: usize = 4;
+
 const EXAMPLE: &str = "Examples:
   innovant simulate model.json input.csv > output.csv
   innovant simulate model.json log.csv --initial-state estimate --output output.csv.gz
@@ -40,7 +43,7 @@ pub(super) struct Flags {
     roles: RoleFlags,
     /// State at the first sample: zero is the operating point; estimate fits it to the recorded outputs, which the input file
     /// must then contain; for a plant in equations also start (the start values of its text) or values by name, as
-    /// `w=3,phi=0.1` [default: zero; for a plant in equations start]
+    /// `w=3,phi=0.1` [default: zero, or where the file of --simulation starts; for a plant in equations start]
     #[arg(long, value_name = "zero|estimate|start|NAME=VALUE")]
     initial_state: Option<String>,
     /// Parameters of a plant in equations: `J=0.02,d=0.1`, or a file that `innovant identify --structure` wrote
@@ -49,7 +52,8 @@ pub(super) struct Flags {
     /// Inputs of a plant in equations between samples [default: zero]
     #[arg(long, value_enum)]
     hold: Option<HoldFlag>,
-    /// Output of the original simulator for this input, for an explanation of a simulator that is not linear
+    /// Output of the original simulator for this input: where it starts, and what an explanation of a simulator that is not
+    /// linear adds to
     #[arg(long, value_name = "FILE")]
     simulation: Option<PathBuf>,
     /// Write the outputs to this file, as CSV; `-` is standard output
@@ -278,6 +282,19 @@ fn simulate_explanation(
             log.samples()
         );
     }
+    // A model of the plant starts where the simulation does; one of the difference between the two starts from zero.
+    let start = match (start, &simulated) {
+        (None, Some(simulated)) if flags.initial_state.is_none() && model.reference.is_none() => {
+            // A simulation has no noise, and goes its own way later.
+            let count = log.samples().min(SAMPLES_A_STATE * (model.a.0.nrows() + 1));
+            let inputs: Vec<&[f64]> = log.input_data.iter().map(|u| &u[..count]).collect();
+            let outputs: Vec<&[f64]> = (simulated.output_data.iter())
+                .map(|y| &y[..count])
+                .collect();
+            Some(model.estimate_initial_state(&inputs, &outputs)?)
+        }
+        (start, _) => start,
+    };
     let correction: Option<Vec<&[f64]>> = simulated
         .as_ref()
         .map(|s| s.output_data.iter().map(Vec::as_slice).collect());

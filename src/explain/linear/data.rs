@@ -80,12 +80,15 @@ impl Data {
     }
 }
 
-/// Standard deviation about the mean; 1 when there is no variation to divide by.
+/// Standard deviation about the mean; 1 when there is no variation to divide by, but that of rounding.
 pub(super) fn deviation<'a>(values: impl Iterator<Item = &'a f64> + Clone) -> f64 {
     let n = values.clone().count().max(1) as f64;
     let mean = values.clone().sum::<f64>() / n;
     let variance = values.map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-    if variance > 0.0 { variance.sqrt() } else { 1.0 }
+    match variance > (4.0 * f64::EPSILON * mean).powi(2) {
+        true => variance.sqrt(),
+        false => 1.0,
+    }
 }
 
 /// An input held back by a delay in samples: before it begins, it had its first value.
