@@ -350,11 +350,15 @@ fn rivals(found: &Found, search: usize, recordings: &[PlantRecording], hold: Hol
         }
         let first = all.len();
         for (estimator, fit, misspecified) in fits {
+            let options = all_free(plant, hold, estimator);
+            let study = Study::new(plant, recordings, &options).ok();
+            let unstable = |study: &Study| accepted > 0 && study.depends_on_rounding(&fit);
+            if study.as_ref().is_some_and(unstable) {
+                continue;
+            }
             let Some(held_out) = held_out(plant, &fit, estimator, recordings, hold) else {
                 continue;
             };
-            let options = all_free(plant, hold, estimator);
-            let study = Study::new(plant, recordings, &options).ok();
             let whole = study.and_then(|s| free_run_error(&s, &fit, recordings));
             all.push(Rival {
                 search,

@@ -13,6 +13,8 @@ use crate::physics::simulation::{Hold, Observer, Plan, Plant, Point, Trajectory}
 
 /// Part of the information of single numbers below which a direction changes no prediction: the accuracy of derivatives, squared.
 const UNCHANGED: f64 = 1e-9;
+/// Part of the mean square of a residual that a noise model leaves, at most, where it may stand for physics.
+const ABSORBED: f64 = 0.1;
 /// A free run whose error is more than twice that of an observer strays: the logarithm of the ratio of their variances.
 const STRAYS: f64 = 1.386;
 
@@ -321,6 +323,37 @@ impl<'a> Study<'a> {
         let covariances =
             Deviance::new(&self.problem, fit.form, fit.noise.clone()).covariances(&fit.point);
         covariances.joint / self.information
+    }
+
+    /// Whether the predictions change by a standard deviation of the noise when the numbers change by what rounding adds to them over the
+    /// recording, so many times the rounding error of a sample (N. J. Higham, *Accuracy and Stability of Numerical Algorithms*,
+    /// section 3.1). Such a free run is unstable, and agrees with the recording by chance.
+    pub(crate) fn depends_on_rounding(&self, fit: &Fit) -> bool {
+        let samples = self.duration() / self.sample_time();
+        let rounded = |value: &f64| value * (1.0 + samples * f64::EPSILON);
+        let moved = Fit {
+            point: fit.point.iter().map(rounded).collect(),
+            ..fit.clone()
+        };
+        let whitened = |fit: &Fit| -> Option<Vec<f64>> {
+            Some(fit.noise.whiten_kept(&self.residual(fit)?, self.mask()))
+        };
+        let both = whitened(fit).zip(whitened(&moved));
+        both.is_some_and(|(one, other)| {
+            let squares = one.iter().zip(&other).map(|(a, b)| (a - b).powi(2));
+            squares.sum::<f64>() > 1.0
+        })
+    }
+
+    /// Whether the noise model foretells nearly all of what the free run leaves of an output: it may stand for physics, and no test after
+    /// it says that none is missing.
+    pub(crate) fn absorbs(&self, fit: &Fit) -> bool {
+        let white = self.gaussian(fit).filter(|f| f.form == Form::FreeRun);
+        white.is_some_and(|white| {
+            let each = white.noise.scale.iter().zip(&fit.noise.scale);
+            each.into_iter()
+                .any(|(whole, new)| new * new < ABSORBED * whole * whole)
+        })
     }
 
     /// By how many standard deviations a number differs from 0 with all others free, whatever their bounds, but for directions in which
