@@ -39,7 +39,7 @@ use super::engine::search::Found;
 use super::engine::select::{CHANCE, agreement, select};
 use super::engine::shared_terms::with_shared_terms;
 use super::engine::terms::term::{Needs, Port, Shape};
-use super::engine::thresholds::{LEFT, SURE, chance};
+use super::engine::thresholds::{LEFT, SURE, THOROUGH, chance};
 use super::explanation::{
     AugmentedPlant, EXPLANATION_FORMAT, EffectFound, EffectSize, Explanation, FitTable, JointTest,
     OutputFit, ParameterChange, Remaining, Verdict,
@@ -425,7 +425,25 @@ impl Answer<'_> {
             .select_rows(&places)
             .select_columns(&places);
         let test = joint_test(&values, &covariance);
-        fitted.hypothesis.is_some() || test.is_none_or(|t| t.p_value < SIGNIFICANT)
+        fitted.hypothesis.is_some()
+            || test.is_none_or(|t| t.p_value < SIGNIFICANT)
+            || self.is_needed(fitted)
+    }
+
+    /// The same by the likelihood ratio of its strength: a stop that is at least so stiff has a large deviation, and is not 0.
+    fn is_needed(&self, fitted: &Fitted) -> bool {
+        let mut parameters = self.parameters_of(fitted);
+        let strength = parameters.nth(fitted.lead.term.shapes.len());
+        let Some((_, at)) = strength.filter(|_| fitted.lead.term.free_strength) else {
+            return false;
+        };
+        let mut without = self.found.fit.clone();
+        without.point[at] = 0.0;
+        let held = self.whole.holding(&without, &[at], THOROUGH);
+        held.is_some_and(|held| {
+            let rises = held.deviance - self.found.fit.deviance;
+            chance(self.whole.information() * rises) < SIGNIFICANT
+        })
     }
 
     /// What else an effect may be.

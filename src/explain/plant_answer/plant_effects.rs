@@ -11,11 +11,11 @@ use crate::explain::engine::fitting::edit::{Place, is_shared_term, user_of};
 use crate::explain::engine::fitting::fitted::Fitted;
 use crate::explain::engine::hypothesis::Hypothesis;
 use crate::explain::engine::screening::curve::Curve;
-use crate::explain::engine::terms::term::{Port, Starts};
+use crate::explain::engine::terms::term::{Port, Shape, Starts};
 use crate::explain::engine::terms::values::{about_usual, filled};
 use crate::explain::engine::thresholds::NEEDED;
 use crate::explain::explanation::{Alternative, EffectFound, Evidence, Law, Quantity};
-use crate::physics::{Excitation, Hold, Plant, VariableId, parse};
+use crate::physics::{Excitation, Hold, ModelSpec, Plant, VariableId, parse};
 
 /// Points of a law.
 const LAW_POINTS: usize = 41;
@@ -27,6 +27,15 @@ const MOSTLY_LINE: f64 = 0.5;
 const MOST_POINTS: usize = 12;
 /// Step of the differences that give a law's slopes, as a part of a parameter.
 const DIFFERENCE: f64 = 1e-4;
+
+/// The unit of the one variable that an effect depends on, as the text has it: an angle in degrees is no pure number to read.
+fn unit_of_argument(fitted: &Fitted, spec: &ModelSpec) -> Option<String> {
+    let [name] = &fitted.depends[..] else {
+        return None;
+    };
+    let variable = spec.variable(spec.find(name)?);
+    (fitted.argument == *name).then(|| variable.unit_text.clone())?
+}
 
 impl Answer<'_> {
     pub(super) fn effect(&self, step: usize, fitted: &Fitted) -> Option<EffectFound> {
@@ -46,14 +55,19 @@ impl Answer<'_> {
         let (at, enters) = (name(at), name(entered));
         let covariance = &self.within_bounds;
         let mut parameters = BTreeMap::new();
-        for (name, at) in self.parameters_of(fitted) {
+        for (i, (name, at)) in self.parameters_of(fitted).enumerate() {
             let std = covariance[(at, at)].max(0.0).sqrt();
+            let shape = fitted.lead.term.shapes.get(i);
+            let unit = match shape.is_some_and(Shape::is_value) {
+                true => unit_of_argument(fitted, &self.plant.spec),
+                false => None,
+            };
             parameters.insert(
                 name.clone(),
                 Quantity {
                     value: self.found.fit.point[at],
                     std: std.is_finite().then_some(std),
-                    unit: self.unit(name),
+                    unit: unit.unwrap_or_else(|| self.unit(name)),
                 },
             );
         }
