@@ -176,6 +176,12 @@ impl Expressions {
         found
     }
 
+    /// Whether an expression has a node of a kind.
+    pub(crate) fn contains(&self, root: ExpressionId, is_one: &dyn Fn(Node) -> bool) -> bool {
+        let node = self.node(root);
+        is_one(node) || node.operands().any(|o| self.contains(o, is_one))
+    }
+
     /// All nodes, in order.
     pub(crate) fn nodes(&self) -> &[Node] {
         &self.nodes

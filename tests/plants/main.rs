@@ -32,3 +32,4 @@ mod plant_parts;
 mod plant_position_loops;
 mod plant_search;
 mod plant_sparse;
+mod plant_travel;

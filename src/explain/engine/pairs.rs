@@ -1,16 +1,19 @@
 //! Two effects in place of what forward selection has found: one term may do some of the work of two, each of which does less alone.
 
 use super::fitting::edit::Place;
-use super::fitting::fitted::{Fitted, TIE};
+use super::fitting::fitted::{Fitted, TIE, tie_with_curve};
 use super::holdout::held_out;
 use super::search::{Found, Question, forward};
 use super::step::Step;
+use super::terms::documentation::PLANT_EFFECTS;
 use super::terms::names::{family, named, special_case};
 use super::thresholds::{IMITATED, LEFT, NEEDED, SECOND, chance};
-use crate::physics::estimate::{EstimateError, Fit};
+use crate::physics::estimate::{EstimateError, Fit, Study};
 
 /// Other first effects beside which a second is looked for, where what was found leaves structure.
 const OTHER_FIRSTS: usize = 4;
+/// ... and in place of a law.
+const FIRSTS_OF_A_LAW: usize = 2;
 
 /// What the equations leave out. The fit of the plant alone may be known.
 ///
@@ -18,6 +21,7 @@ const OTHER_FIRSTS: usize = 4;
 /// As those of an estimation.
 pub(crate) fn search(question: Question, known: Option<&Fit>) -> Result<Found, EstimateError> {
     let found = forward(question, known, None)?;
+    let found = special_case_first(question, &found).unwrap_or(found);
     let gain = found.gain();
     let least = gain + TIE.0.max(TIE.1 * gain);
     let pairs = pairs(question, &found)
@@ -42,6 +46,30 @@ pub(crate) fn search(question: Question, known: Option<&Fit>) -> Result<Found, E
     }
 }
 
+/// Two effects that begin with the special case of the first, where both gain as much: beside the second, the number that the special case
+/// lacks may say nothing.
+fn special_case_first(question: Question, found: &Found) -> Option<Found> {
+    let spec = &question.plant.spec;
+    let (first, others) = found.steps.first()?.split_first()?;
+    let wanted = special_case(named(spec, first)).filter(|_| found.accepted > 1)?;
+    let is_wanted = |f: &Fitted| named(spec, f) == wanted && f.lead.place == first.lead.place;
+    let at = others.iter().position(is_wanted)?;
+    let simple = forward(question, Some(&found.baseline), Some(begun(found, at + 1))).ok()?;
+    let least = found.gain() - tie_with_curve(found.gain());
+    (simple.accepted > 1 && simple.gain() >= least).then_some(simple)
+}
+
+/// The first step of a search with another first effect.
+fn begun(found: &Found, first: usize) -> Step {
+    let mut fitted = found.steps[0].clone();
+    fitted[..=first].rotate_right(1);
+    Step {
+        fitted,
+        strongest: found.tests[0],
+        map: found.map.clone(),
+    }
+}
+
 /// Pairs that begin with other first effects, where what was found leaves structure or is a curve of an input.
 fn pairs(question: Question, found: &Found) -> Vec<Found> {
     let spec = &question.plant.spec;
@@ -51,18 +79,34 @@ fn pairs(question: Question, found: &Found) -> Vec<Found> {
     };
     // Little beside a large effect is what its formula leaves, as in `decide`.
     let (strongest, tests) = found.left();
-    let little_left = chance(strongest) * tests as f64 > LEFT || strongest < SECOND.1 * first.gain;
-    // A curve of an input may be that of two effects: its middle and its ends.
+    let nothing_left = chance(strongest) * tests as f64 > LEFT;
+    let little_left = nothing_left || strongest < SECOND.1 * first.gain;
+    // A curve of an input may be that of two effects: its middle and its ends. So may any that is not all.
     let of_input = |f: &Fitted| matches!(f.lead.place, Place::Input(_));
-    let is_input_curve = of_input(first) && named(spec, first) == "law";
-    if little_left && !is_input_curve || first.hypothesis.is_some() {
+    let is_law = named(spec, first) == "law";
+    let is_input_curve = of_input(first) && is_law;
+    let is_not_all = is_law && (!nothing_left || absorbs(question, found));
+    if little_left && !is_input_curve && !is_not_all || first.hypothesis.is_some() {
         return vec![];
     }
-    let least = match is_input_curve {
+    let least = match is_input_curve || is_not_all {
         true => NEEDED,
         false => NEEDED.max(IMITATED * first.gain),
     };
     let id = |f: &Fitted| named(spec, f);
+    // In place of a law two effects with names are looked for.
+    let mut scope = question.scope.clone();
+    if is_law && scope.only.is_empty() {
+        scope.only = PLANT_EFFECTS.iter().map(|e| e.id.to_owned()).collect();
+    }
+    let most = match is_law {
+        true => FIRSTS_OF_A_LAW,
+        false => OTHER_FIRSTS,
+    };
+    let question = Question {
+        scope: &scope,
+        ..question
+    };
     let proven = |f: &Fitted| f.gain > least && f.hypothesis.is_none();
     let proven_ids = found.steps[0].iter().filter(|f| proven(f)).map(id);
     let special_cases: Vec<&str> = proven_ids.filter_map(special_case).collect();
@@ -70,9 +114,9 @@ fn pairs(question: Question, found: &Found) -> Vec<Found> {
     let mut pairs: Vec<Found> = Vec::new();
     for (i, other) in others.iter().enumerate() {
         let its_family = |f: &Fitted| family(id(f)) == family(id(other));
-        if its_family(first)
+        if id(other) == id(first)
             || tried.contains(&other.lead.term.id)
-            || little_left && !of_input(other)
+            || little_left && !is_not_all && !of_input(other)
         {
             continue;
         }
@@ -82,20 +126,19 @@ fn pairs(question: Question, found: &Found) -> Vec<Found> {
         let again = pairs
             .iter()
             .any(|p| p.steps[0].first().is_some_and(its_family));
-        let as_other = proven(other) && id(other) != "law" && tried.len() < OTHER_FIRSTS && !again;
+        let as_other = proven(other) && id(other) != "law" && tried.len() < most && !again;
         if !(as_special_case || as_other) {
             continue;
         }
         tried.push(other.lead.term.id);
-        let mut fitted = [std::slice::from_ref(first), others].concat();
-        fitted[..=i + 1].rotate_right(1);
-        let begun = Step {
-            fitted,
-            strongest: found.tests[0],
-            map: found.map.clone(),
-        };
-        let pair = forward(question, Some(&found.baseline), Some(begun)).ok();
+        let pair = forward(question, Some(&found.baseline), Some(begun(found, i + 1))).ok();
         pairs.extend(pair.filter(|p| p.accepted > 1));
     }
     pairs
+}
+
+/// Whether the noise model of what was found may stand for physics.
+fn absorbs(question: Question, found: &Found) -> bool {
+    let study = Study::new(&found.plant, question.recordings, &found.options);
+    study.is_ok_and(|study| study.absorbs(&found.fit))
 }

@@ -1,10 +1,11 @@
 //! A lead made into a plant that can be fitted.
 
-use crate::explain::engine::fitting::edit::{Edit, NewParameter, Place, acting};
+use crate::explain::engine::fitting::edit::{Edit, NewParameter, Place, acting, literal};
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
+use crate::explain::engine::terms::names::is_without_units;
 use crate::explain::engine::terms::term::{Port, Starts};
-use crate::explain::engine::terms::values::{about_usual, filled};
+use crate::explain::engine::terms::values::{FAST, about_usual, filled};
 use crate::explain::engine::thresholds::{GLANCED_ACCURACY, limited};
 use crate::physics::estimate::{Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Node, Plant};
@@ -118,14 +119,32 @@ pub(crate) fn candidate(
         Place::Equation(at) => spec.equations[at].coefficient,
         _ => None,
     };
-    let factor = factor.map_or_else(
-        || "1.0".to_owned(),
-        |id| {
-            let span = spec.expressions.span(id);
-            format!("({})", &spec.text[span.start..span.end])
-        },
-    );
-    let body = filled(term.form, term, &text, &memories, &shapes, times).replace("{a}", &factor);
+    let factor = factor.map(|id| {
+        let span = spec.expressions.span(id);
+        let text = &spec.text[span.start..span.end];
+        match spec.expressions.node(id) {
+            Node::Variable(_) => text.to_owned(),
+            _ => format!("({text})"),
+        }
+    });
+    let form = match term.form.contains("{instant}") {
+        true => {
+            let name = free_name(spec, &format!("{}_time", term.id));
+            let unit = match is_without_units(spec) {
+                true => "",
+                false => "(unit=\"s\")",
+            };
+            let value = literal(h / FAST);
+            (edit.declarations).push(format!("final parameter Real {name}{unit} = {value};"));
+            term.form.replace("{instant}", &name)
+        }
+        false => term.form.to_owned(),
+    };
+    let body = filled(&form, term, &text, &memories, &shapes, times);
+    let body = match factor {
+        Some(factor) => body.replace("{a}", &factor),
+        None => body.replace("{a}*", "").replace("{a}", "1.0"),
+    };
     let body = about_usual(&body, argument.map_or(0.0, Argument::usual));
     let rate = argument.and_then(|a| a.rate.as_deref());
     let body = match body.contains("{dz}") {
@@ -182,8 +201,12 @@ pub(crate) fn candidate(
     };
     debug_assert!(!(lead.sensor && term.port != Port::Sensor));
     // What stands in the place of a signal is written without it: `u_acting = delay(u, T)`.
-    let whole = (term.port != Port::Equation && !term.free_strength && lead.curve.is_none())
-        .then(|| body.strip_suffix(&format!(" - {text}")))
+    let replaced = match term.port {
+        Port::Equation => "{v}",
+        _ => &text,
+    };
+    let whole = (!term.free_strength && lead.curve.is_none())
+        .then(|| body.strip_suffix(&format!(" - {replaced}")))
         .flatten();
     let change = whole.map_or_else(|| format!("{{v}} + {added}"), str::to_owned);
     edit.changes.push((lead.place, change));

@@ -24,18 +24,25 @@ pub(in crate::explain::engine) fn differs(
         Port::Equation | Port::Parameter => Port::Equation,
         port => port,
     };
-    let repeats =
-        !depends.is_empty() && depends == first.depends && kind(port) == kind(first.lead.term.port);
-    !matches!(id, "law" | "cross_coupling" | "viscous_friction")
-        && (are_apart(id, its_id) || family(id) != family(its_id) && !repeats)
+    // What comes later is no function of its argument.
+    let is_later = |id: &str| matches!(id, "input_delay" | "actuator_lag");
+    let repeats = !depends.is_empty()
+        && depends == first.depends
+        && kind(port) == kind(first.lead.term.port)
+        && is_later(id) == is_later(its_id);
+    let is_new = family(id) != family(its_id) && !repeats;
+    are_apart(id, its_id) || is_new && !matches!(id, "law" | "cross_coupling" | "viscous_friction")
 }
 
-/// Effects of one variable that act at opposite ends of it, and often together: the middle and the ends of an input, the road load of
-/// what coasts.
-const APART: [[&str; 2]; 3] = [
+/// Effects of one variable that act at opposite ends of it, and often together: the middle and the ends of an input, the friction and
+/// the drag of what coasts, the outlet and the edge of a tank.
+const APART: [[&str; 2]; 6] = [
     ["input_dead_zone", "input_saturation"],
     ["coulomb_friction", "quadratic_drag"],
     ["stribeck_friction", "quadratic_drag"],
+    ["coulomb_friction", "viscous_friction"],
+    ["stribeck_friction", "viscous_friction"],
+    ["leak", "overflow"],
 ];
 
 fn are_apart(one: &str, other: &str) -> bool {

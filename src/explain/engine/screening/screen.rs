@@ -364,13 +364,16 @@ impl Tests<'_> {
                 let own = spec.equations[at].unknown;
                 argument.is_some_and(|a| own == Unknown::Derivative(a.variables[0]))
             }
+            (Place::Equation(at), Port::Equation) if instance.term.needs == Needs::Integrated => {
+                argument.is_some_and(|a| integrates(spec, at, a.variables[0]))
+            }
             (Place::Equation(at), Port::Equation) => {
                 argument.is_none_or(|a| a.known_after.is_none_or(|k| k < at))
             }
             (Place::Input(v), Port::Input) => argument.is_some_and(|a| a.variables == [v]),
             // Equations that were found from columns have no variable for a force between bodies.
             (Place::Input(v), Port::Equation) => {
-                instance.term.needs != Needs::OwnState
+                !matches!(instance.term.needs, Needs::OwnState | Needs::Integrated)
                     && is_without_units(spec)
                     && enters_several(spec, v)
                     && argument.is_some_and(|a| !a.held && a.known_after.is_none())
@@ -486,6 +489,17 @@ impl Tests<'_> {
         }
         found
     }
+}
+
+/// Whether an equation determines the derivative of a state, and does not depend on it.
+pub(in crate::explain::engine) fn integrates(
+    spec: &ModelSpec,
+    at: usize,
+    state: VariableId,
+) -> bool {
+    let equation = &spec.equations[at];
+    equation.unknown == Unknown::Derivative(state)
+        && !spec.expressions.variables(equation.rest).contains(&state)
 }
 
 /// Frequencies in rad/s at which the whitened residual has most power, the strongest of each output; those of fewer periods than

@@ -6,10 +6,15 @@ use super::Stage;
 use super::origins::{Origin, Origins};
 use super::promising::{is_specific, promising};
 use crate::explain::engine::fitting::candidate::{Candidate, candidate};
+use crate::explain::engine::fitting::edit::{Place, places};
 use crate::explain::engine::fitting::fitted::{Fitted, TIE, forms, searched, with_more};
 use crate::explain::engine::fitting::release::released;
-use crate::explain::engine::screening::screen::Lead;
-use crate::explain::engine::terms::names::named;
+use crate::explain::engine::screening::screen::{Lead, integrates};
+use crate::explain::engine::terms::argument::Argument;
+use crate::explain::engine::terms::library::TERMS;
+use crate::explain::engine::terms::names::{called, named};
+use crate::explain::engine::terms::term::Needs;
+use crate::explain::engine::terms::values::grid;
 use crate::explain::engine::thresholds::{
     COMPARED, FITTED, FOLLOWS, GLANCE, GLANCED_STEPS, MOST_STEPS, THOROUGH, times_more,
 };
@@ -42,7 +47,83 @@ impl Candidates<'_> {
         let chosen = self.chosen();
         let mut fitted: Vec<Fitted> = chosen.into_par_iter().filter_map(|g| self.fit(g)).collect();
         fitted.extend(self.named_at_the_best(&fitted));
+        fitted.extend(self.limits());
         fitted
+    }
+
+    /// Limits of what integrates, whatever a test said of them: the plant without them runs far beyond, where nothing is like the recording,
+    /// and a limit that is not reached does nothing. They begin at the ends of what was recorded, with parameters as they were and as
+    /// the text has them.
+    fn limits(&self) -> Vec<Fitted> {
+        let Some(at) = self.origins.all.len().checked_sub(1) else {
+            return vec![];
+        };
+        let Origin { screen, fit } = &self.origins.all[at];
+        if screen.leads.is_empty() {
+            return vec![];
+        }
+        let spec = &self.stage.plant.spec;
+        let mut leads: Vec<Lead> = Vec::new();
+        for place in places(spec, self.stage.given) {
+            let Place::Equation(equation) = place else {
+                continue;
+            };
+            let own = |a: &Argument| {
+                a.serves(Needs::Integrated) && integrates(spec, equation, a.variables[0])
+            };
+            let Some(argument) = screen.arguments.iter().position(own) else {
+                continue;
+            };
+            let limits = TERMS.iter().filter(|t| t.needs == Needs::Integrated);
+            leads.extend(limits.flat_map(|term| {
+                let argument_of = Some(&screen.arguments[argument]);
+                let starts = grid(term, argument_of, self.stage.recordings, &[]);
+                let lead = |shapes: Vec<f64>| {
+                    Lead::untested(term, place).at(place, Some(argument), &shapes)
+                };
+                starts.into_iter().map(lead)
+            }));
+        }
+        leads.retain(|l| {
+            let variables = l
+                .argument
+                .map_or(&[][..], |a| &screen.arguments[a].variables);
+            self.stage
+                .scope
+                .allows(called(spec, l.term, l.place, variables))
+        });
+        let (stage, from_text) = (self.stage, self.origins.from_text.as_ref());
+        let starts: Vec<(&Lead, &Fit)> = leads
+            .iter()
+            .flat_map(|lead| {
+                from_text
+                    .into_iter()
+                    .chain([fit])
+                    .map(move |from| (lead, from))
+            })
+            .collect();
+        let each = starts.into_par_iter().filter_map(|(lead, from)| {
+            let study = stage.study;
+            let made = candidate(&stage.plant.spec, lead, &screen.arguments, stage.recordings)?;
+            let options = with_more(stage.options, made.values.len());
+            let rough = made.rough(study, MOST_STEPS);
+            let inner = study.of(&rough, &options).ok()?;
+            let free_run = Fit {
+                form: Form::FreeRun,
+                point: from.point[..study.nominal().len()].to_vec(),
+                ..from.clone()
+            };
+            let start = inner.gaussian(&made.from(&free_run, study.parameters()))?;
+            let fit = inner.refit(&start, 1, THOROUGH)?;
+            self.fit(Glanced {
+                gain: 0.0,
+                lead: lead.clone(),
+                origin: at,
+                candidate: made,
+                fit,
+            })
+        });
+        each.collect()
     }
 
     /// How many times more is tried.
@@ -178,9 +259,15 @@ impl Candidates<'_> {
             return vec![];
         };
         let mut more: Vec<(usize, Lead)> = Vec::new();
+        // A function of an input alone may be one of its actuator.
+        let of_input = match &best.depends[..] {
+            [name] => spec.find(name).map(Place::Input),
+            _ => None,
+        };
         for (i, origin) in self.origins.all.iter().enumerate() {
-            let leads = &origin.screen.leads;
-            for lead in leads.iter().filter(|l| l.place == best.lead.place) {
+            let leads = origin.screen.leads.iter();
+            let there = |l: &&Lead| l.place == best.lead.place || Some(l.place) == of_input;
+            for lead in leads.filter(there) {
                 let known = fitted.iter().any(|f| f.lead.is_alike(lead))
                     || more.iter().any(|(_, l)| l.is_alike(lead));
                 let of_form = more.iter().filter(|(_, l)| l.term == lead.term).count();

@@ -229,7 +229,9 @@ impl Argument {
                 turns || self.serves(Needs::OneWay)
             }
             Needs::OneWay => self.velocity && self.quantile(0.0) * self.quantile(1.0) > 0.0,
-            Needs::OwnState => self.form == ArgumentForm::Variable && !self.held,
+            Needs::OwnState | Needs::Integrated => {
+                self.form == ArgumentForm::Variable && !self.held
+            }
             Needs::SwitchedOn => {
                 self.held
                     && self

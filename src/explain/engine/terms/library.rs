@@ -13,8 +13,8 @@ pub(super) const TIMES: &[f64] = &[
 ];
 
 use Needs::{
-    AboutZero, AlongPath, Angle, Anything, BothSigns, Difference, Directed, Driven, OneWay,
-    OwnState, Positive, Radiation, Stretch, SwitchedOn, Time, Velocity,
+    AboutZero, AlongPath, Angle, Anything, BothSigns, Difference, Directed, Driven, Integrated,
+    OneWay, OwnState, Positive, Radiation, Stretch, SwitchedOn, Time, Velocity,
 };
 use Port::{Equation, Input, Parameter, Sensor};
 
@@ -78,6 +78,18 @@ const fn lag(start: MemoryStart) -> Memory {
         rate: "({z} - {m})/{T}",
         start,
         sampled: false,
+    }
+}
+
+const UPPER: Shape = shape("upper", Starts::Quantiles(&[0.98]), false);
+const LOWER: Shape = shape("lower", Starts::Quantiles(&[0.02]), false);
+
+/// What cannot leave a range, whatever drives it: at an end its rate is no larger than what brings it there within a part of a sample.
+const fn limit(form: &'static str, shapes: &'static [Shape]) -> Term {
+    Term {
+        free_strength: false,
+        symbol: "",
+        ..curve("limit", Equation, Integrated, form, shapes)
     }
 }
 
@@ -261,6 +273,12 @@ pub(crate) const TERMS: &[Term] = &[
         "max({z} - {from}, 0) + min({z} + {from}, 0)",
         &[shape("from", Starts::SizeQuantiles(ABOVE), true)],
     ),
+    limit(
+        "min(max({v}, {a}*({lower} - {z})/{instant}), {a}*({upper} - {z})/{instant}) - {v}",
+        &[UPPER, LOWER],
+    ),
+    limit("min({v}, {a}*({upper} - {z})/{instant}) - {v}", &[UPPER]),
+    limit("max({v}, {a}*({lower} - {z})/{instant}) - {v}", &[LOWER]),
     // Play in a spring that the equations have: it takes its force away, up to the gap `g`.
     curve(
         "gap",

@@ -35,7 +35,8 @@ fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
         .states()
         .iter()
         .any(|&v| defines(spec, v) || is_of_speed(unit(v)));
-    // Of a position only the velocity need be known: `der(x) = v` with a state `v`.
+    // Of a position only the velocity need be known: `der(x) = v` with a state `v`. A length may be a level; an angle is a position, and
+    // so is a length with a rate that is a product.
     let states = spec.states();
     let moves_by = |x: VariableId| {
         spec.equations.iter().any(|e| {
@@ -46,7 +47,11 @@ fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
     };
     if all(&|v| defines(spec, v) || is_of_speed(unit(v))) {
         Kind::Velocity
-    } else if all(&moves_by) || moves && all(&|v| matches!(unit(v), "m" | "rad" | "deg" | "mm")) {
+    } else if all(&moves_by)
+        || moves && all(&|v| matches!(unit(v), "m" | "mm"))
+        || all(&|v| matches!(unit(v), "rad" | "deg"))
+        || all(&|v| matches!(unit(v), "m" | "mm") && is_driven_only(spec, v))
+    {
         Kind::Position
     } else if all(&|v| matches!(unit(v), "K" | "degC")) {
         Kind::Temperature
@@ -55,6 +60,16 @@ fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
     } else {
         Kind::Other
     }
+}
+
+/// Whether the rate of a state is a product without the state, as of a drive: a store has flows in and out.
+fn is_driven_only(spec: &ModelSpec, state: VariableId) -> bool {
+    let own = |e: &&Equation| e.unknown == Unknown::Derivative(state);
+    spec.equations.iter().find(own).is_some_and(|e| {
+        let is_sum = |node| matches!(node, Node::Binary(Binary::Add | Binary::Subtract, ..));
+        let used = spec.expressions.variables(e.rest);
+        !used.contains(&state) && !spec.expressions.contains(e.rest, &is_sum)
+    })
 }
 
 /// Whether a unit is one of a speed.
@@ -343,6 +358,12 @@ pub(crate) fn called(
             Kind::Position => "end_stop",
             _ if *variables == [own] && may_be_level => "overflow",
             _ => "law",
+        },
+        (Port::Equation, "limit") => match what {
+            Kind::Position => "end_stop",
+            _ if !may_be_level => "law",
+            _ if is_driven_only(spec, own) => "end_stop",
+            _ => "overflow",
         },
         (Port::Equation, "root_above") if *variables == [own] && may_be_level => "overflow",
         (Port::Equation, "root") if *variables == [own] && may_be_level => "leak",

@@ -63,14 +63,36 @@ const ABOVE_MORE: &[Term] = &[
         "max({z} - {from}, 0)^{p}",
         &[shape("from", Starts::Quantiles(ABOVE), false), POWER],
     ),
+    curve(
+        "above",
+        Equation,
+        Anything,
+        "max({z} - {from}, 0) + min({z} - {lower}, 0)",
+        &[
+            shape("from", Starts::Quantiles(ABOVE), false),
+            shape("lower", Starts::Quantiles(BELOW), false),
+        ],
+    ),
 ];
-const BELOW_MORE: &[Term] = &[curve(
-    "below",
-    Equation,
-    Anything,
-    "min({z} - {from}, 0)*max({V} - {dz}, 0)/{V}",
-    &[shape("from", Starts::Quantiles(BELOW), false), DAMPING],
-)];
+const BELOW_MORE: &[Term] = &[
+    curve(
+        "below",
+        Equation,
+        Anything,
+        "min({z} - {from}, 0)*max({V} - {dz}, 0)/{V}",
+        &[shape("from", Starts::Quantiles(BELOW), false), DAMPING],
+    ),
+    curve(
+        "below",
+        Equation,
+        Anything,
+        "min({z} - {from}, 0) + max({z} - {upper}, 0)",
+        &[
+            shape("from", Starts::Quantiles(BELOW), false),
+            shape("upper", Starts::Quantiles(ABOVE), false),
+        ],
+    ),
+];
 const BOTH_SIDES_MORE: &[Term] = &[
     curve(
         "both_sides",
@@ -219,6 +241,6 @@ mod tests {
             assert_eq!(of(richer), of(simple));
             count += 1;
         }
-        assert_eq!(count, 24);
+        assert_eq!(count, 26);
     }
 }

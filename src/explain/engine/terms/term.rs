@@ -44,6 +44,8 @@ pub(crate) enum Needs {
     Directed,
     /// The state whose derivative the equation determines.
     OwnState,
+    /// Such a state that its own derivative does not depend on: what moves or fills as it is driven.
+    Integrated,
     /// What is switched on as each recording begins: it is not zero at the first sample, and may have been before.
     SwitchedOn,
     /// No argument: a function of time alone.
@@ -127,6 +129,11 @@ impl Shape {
         matches!(self.starts, Starts::Instants(_))
     }
 
+    /// Whether it is a value of the argument.
+    pub(crate) fn is_value(&self) -> bool {
+        matches!(self.starts, Starts::Quantiles(_) | Starts::SizeQuantiles(_))
+    }
+
     /// Whether it is a time that something takes.
     pub(crate) fn is_duration(&self) -> bool {
         matches!(self.starts, Starts::Samples(_) | Starts::Length(_))
@@ -142,7 +149,7 @@ pub(crate) struct Term {
     pub(crate) needs: Needs,
     /// Function of `{z}`, of the shapes, of the memories, and of the time `{begin}` at which the recordings begin; the strength is its
     /// factor. `{v}` is what stands at the place,
-    /// `{a}` the factor of the derivative there, `{-usual}` ` - ` and a usual value of `{z}`, `{-usual^2}` its square.
+    /// `{a}` the factor of the derivative there, `{instant}` a part of a sample, `{-usual}` ` - ` and a usual value of `{z}`, `{-usual^2}` its square.
     pub(crate) form: &'static str,
     pub(crate) memories: &'static [Memory],
     pub(crate) shapes: &'static [Shape],

@@ -19,7 +19,7 @@ const PERIODS: u32 = 48;
 /// Wave numbers that are tried of a position: every half period from the first.
 pub(in crate::explain::engine) const WAVES: u32 = 2 * PERIODS - 1;
 /// A memory that follows at once does so in a sample divided by this.
-const FAST: f64 = 5.0;
+pub(in crate::explain::engine) const FAST: f64 = 5.0;
 
 /// Values that a shape's search starts from.
 pub(in crate::explain::engine) fn starts(
@@ -127,7 +127,8 @@ pub(crate) fn filled(
     let mut text = form
         .replace("{z}", argument)
         .replace("{begin}", &format!("({})", literal(begin)))
-        .replace("{fast}", &literal(FAST / sample_time));
+        .replace("{fast}", &literal(FAST / sample_time))
+        .replace("{instant}", &literal(sample_time / FAST));
     for (symbol, name) in MEMORIES.iter().zip(memories) {
         text = text.replace(symbol, name);
     }

@@ -229,7 +229,7 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
     effect(
         "end_stop",
         "stop at the end of the travel",
-        "m*der(v) = ... + k*(max(x - c, 0) + min(x + c, 0)), or one side of it; with damping max(1 +- v/V, 0) where the recording shows it",
+        "m*der(v) = ... + k*(max(x - c, 0) + min(x + c, 0)), or one side of it; with damping max(1 +- v/V, 0) where the recording shows it; of a drive der(x) = min(max(..., (lower - x)/T), (upper - x)/T), where T is a fifth of a sample",
         ANY_EQUATION,
         A_POSITION,
         &[

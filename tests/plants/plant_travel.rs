@@ -1,0 +1,135 @@
+//! Actuators that integrate a command: ends of the travel, dead zones and limits, which each say little alone.
+
+use crate::folder::{Folder, effects};
+use crate::plant_neighbours::{explained, levels, number, recorded};
+
+/// The rate of what cannot leave a travel.
+fn within(rate: f64, position: f64, (lower, upper): (f64, f64)) -> f64 {
+    rate.max((lower - position) * 100.0)
+        .min((upper - position) * 100.0)
+}
+
+/// The vent of a greenhouse: a worm gear that does nothing below 14 % of the command, and a window with two ends. The fit without them
+/// leaves its gain at nothing, and a noise model takes up what the dead zone does.
+#[test]
+fn the_ends_of_a_travel_and_a_dead_zone_are_found_together() {
+    let command = levels(40, -75.0, 75.0);
+    let log = recorded(
+        "cmd,angle",
+        (1800, 0.5),
+        &[&command],
+        |x, u, _| {
+            let acts = (u[0].abs() - 14.0).max(0.0) * u[0].signum();
+            vec![within(0.03 * acts, x[0], (0.0, 48.0))]
+        },
+        (&[20.0], &[(0, 0.2)]),
+    );
+    let said = explained(
+        &Folder::new(),
+        &log,
+        "model Vent\n  parameter Real k(unit=\"deg/s\", min=0.005, max=0.1) = 0.02;\n  input Real cmd;\n  output Real angle(unit=\"deg\");\n  Real a(unit=\"deg\", start=0);\nequation\n  der(a) = k*cmd;\n  angle = a;\nend Vent;\n",
+    );
+    let mut names = effects(&said);
+    names.sort_unstable();
+    assert_eq!(
+        names,
+        ["end_stop", "input_dead_zone"],
+        "{}",
+        said["summary"]
+    );
+    let of = |id: &str| effects(&said).iter().position(|e| *e == id).unwrap();
+    let zone = number(&said, of("input_dead_zone"), "input_dead_zone_d");
+    assert!((zone - 14.0).abs() < 0.3, "{zone}");
+    let upper = &said["effects"][of("end_stop")]["parameters"]["limit_upper"];
+    assert!(
+        (upper["value"].as_f64().unwrap() - 48.0).abs() < 0.1,
+        "{upper}"
+    );
+    assert_eq!(upper["unit"], "deg");
+}
+
+/// What acts late and is limited: the one is no form of the other.
+#[test]
+fn a_delay_and_a_limit_may_be_of_one_input() {
+    let command = levels(24, 0.0, 95.0);
+    let acting = |k: usize| command(k.saturating_sub(2)).min(65.0);
+    let clean = recorded(
+        "f,v",
+        (1500, 0.25),
+        &[&acting],
+        |x, u, _| vec![(0.021 * u[0] - x[0]) / 0.8],
+        (&[0.0], &[(0, 0.01)]),
+    );
+    let mut log = String::from("t,f,v\n");
+    for (k, line) in clean.lines().skip(1).enumerate() {
+        let each: Vec<&str> = line.split(',').collect();
+        log.push_str(&format!("{},{},{}\n", each[0], command(k), each[2]));
+    }
+    let said = explained(
+        &Folder::new(),
+        &log,
+        "model Conveyor\n  parameter Real K(unit=\"m/s\") = 0.018;\n  parameter Real T(unit=\"s\") = 1.0;\n  input Real f;\n  output Real v(unit=\"m/s\");\n  Real s(unit=\"m/s\", start=0);\nequation\n  T*der(s) = K*f - s;\n  v = s;\nend Conveyor;\n",
+    );
+    let mut names = effects(&said);
+    names.sort_unstable();
+    assert_eq!(
+        names,
+        ["input_delay", "input_saturation"],
+        "{}",
+        said["summary"]
+    );
+    assert_eq!(said["verdict"], "named", "{}", said["summary"]);
+}
+
+/// Heat capacity, loss and power have a common scale that no recording tells: the deviation of each is large, and that of what changes
+/// too. It is proven all the same.
+#[test]
+fn a_common_scale_of_all_parameters_does_not_hide_a_change() {
+    let heat = levels(60, 0.0, 24.0);
+    let log = recorded(
+        "u,T",
+        (1500, 6.0),
+        &[&heat],
+        |x, u, t| {
+            let power = if t > 4500.0 { 9.5 } else { 14.0 };
+            vec![(power * u[0] - 3.2 * (x[0] - 20.0)) / 3200.0]
+        },
+        (&[22.0], &[(0, 0.15)]),
+    );
+    let said = explained(
+        &Folder::new(),
+        &log,
+        "model Boiler\n  parameter Real C(unit=\"J/K\") = 3800;\n  parameter Real G(unit=\"W/K\") = 2.7;\n  parameter Real P(unit=\"W\") = 12;\n  input Real u;\n  output Real T(unit=\"degC\");\n  Real Th(unit=\"degC\", start=22);\nequation\n  C*der(Th) = P*u - G*(Th - 20);\n  T = Th;\nend Boiler;\n",
+    );
+    assert_eq!(effects(&said), ["parameter_change"], "{}", said["summary"]);
+    assert_eq!(said["verdict"], "named", "{}", said["summary"]);
+}
+
+/// Friction and drag of one speed: a curve follows both, and two names say more.
+#[test]
+fn friction_and_drag_come_before_a_curve_of_both() {
+    let force = levels(60, -80.0, 200.0);
+    let log = recorded(
+        "force,speed",
+        (2400, 0.1),
+        &[&force],
+        |x, u, _| {
+            let v = x[0];
+            vec![(u[0] - 9.0 * (v / 0.02).tanh() - 0.55 * v * v.abs() - 2.0 * v) / 110.0]
+        },
+        (&[0.0], &[(0, 0.03)]),
+    );
+    let said = explained(
+        &Folder::new(),
+        &log,
+        "model Scooter\n  parameter Real m(unit=\"kg\", min=80, max=150) = 95;\n  parameter Real b(unit=\"N.s/m\", min=0, max=20) = 5;\n  input Real force(unit=\"N\");\n  output Real speed(unit=\"m/s\");\n  Real v(unit=\"m/s\", start=0);\nequation\n  m*der(v) = force - b*v;\n  speed = v;\nend Scooter;\n",
+    );
+    let mut names = effects(&said);
+    names.sort_unstable();
+    assert_eq!(
+        names,
+        ["coulomb_friction", "quadratic_drag"],
+        "{}",
+        said["summary"]
+    );
+}
