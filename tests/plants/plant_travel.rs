@@ -105,30 +105,36 @@ fn a_common_scale_of_all_parameters_does_not_hide_a_change() {
     assert_eq!(said["verdict"], "named", "{}", said["summary"]);
 }
 
-/// Friction and drag of one speed: a curve follows both, and two names say more.
+/// A garage door with dry friction that hits the floor: alone the friction looks like one that falls with speed, which the contact does;
+/// beside the stop it is plain.
 #[test]
-fn friction_and_drag_come_before_a_curve_of_both() {
-    let force = levels(60, -80.0, 200.0);
+fn beside_a_stop_friction_keeps_its_simple_form() {
+    let force = levels(50, -90.0, 110.0);
     let log = recorded(
-        "force,speed",
-        (2400, 0.1),
+        "force,pos",
+        (2200, 0.05),
         &[&force],
         |x, u, _| {
-            let v = x[0];
-            vec![(u[0] - 9.0 * (v / 0.02).tanh() - 0.55 * v * v.abs() - 2.0 * v) / 110.0]
+            let floor = match x[0] < 0.0 {
+                true => -4e4 * x[0] - 900.0 * x[1],
+                false => 0.0,
+            };
+            let spring = 60.0 * (x[0] - 0.9);
+            let friction = 35.0 * x[1] + 18.0 * (x[1] / 0.004).tanh();
+            vec![x[1], (u[0] - friction - spring + floor) / 62.0]
         },
-        (&[0.0], &[(0, 0.03)]),
+        (&[0.9, 0.0], &[(0, 0.0008)]),
     );
     let said = explained(
         &Folder::new(),
         &log,
-        "model Scooter\n  parameter Real m(unit=\"kg\", min=80, max=150) = 95;\n  parameter Real b(unit=\"N.s/m\", min=0, max=20) = 5;\n  input Real force(unit=\"N\");\n  output Real speed(unit=\"m/s\");\n  Real v(unit=\"m/s\", start=0);\nequation\n  m*der(v) = force - b*v;\n  speed = v;\nend Scooter;\n",
+        "model Door\n  parameter Real m(unit=\"kg\", min=40, max=90) = 55;\n  parameter Real d(unit=\"N.s/m\", min=5, max=120) = 50;\n  parameter Real k(unit=\"N/m\", min=20, max=120) = 50;\n  parameter Real x0(unit=\"m\", min=0.5, max=1.2) = 0.9;\n  input Real force(unit=\"N\");\n  output Real pos(unit=\"m\");\n  Real x(unit=\"m\", start=0.9);\n  Real v(unit=\"m/s\", start=0);\nequation\n  der(x) = v;\n  m*der(v) = force - d*v - k*(x - x0);\n  pos = x;\nend Door;\n",
     );
     let mut names = effects(&said);
     names.sort_unstable();
     assert_eq!(
         names,
-        ["coulomb_friction", "quadratic_drag"],
+        ["coulomb_friction", "end_stop"],
         "{}",
         said["summary"]
     );

@@ -410,13 +410,14 @@ impl Answer<'_> {
     }
 
     /// Whether the recording tells the parameters of an effect from 0, all together: a strength and the level it acts from may be
-    /// known together only. An instant is not told from 0. So is an effect without parameters, and one whose covariance is not known.
+    /// known together only. An instant and a place on the axis of a variable are not told from 0. So is an effect without other
+    /// parameters, and one whose covariance is not known.
     fn is_significant(&self, fitted: &Fitted) -> bool {
         let shapes = fitted.lead.term.shapes;
-        let instant = |i: usize| shapes.get(i).is_some_and(Shape::is_instant);
+        let place = |i: usize| shapes.get(i).is_some_and(Shape::is_place);
         let parameters = self.parameters_of(fitted).enumerate();
         let places: Vec<usize> = parameters
-            .filter(|(i, _)| !instant(*i))
+            .filter(|(i, _)| !place(*i))
             .map(|(_, (_, at))| at)
             .collect();
         let values: Vec<f64> = places.iter().map(|&p| self.found.fit.point[p]).collect();

@@ -129,6 +129,11 @@ impl Shape {
         matches!(self.starts, Starts::Instants(_))
     }
 
+    /// Whether it is a place on the axis of the argument or of time, where 0 is like any other.
+    pub(crate) fn is_place(&self) -> bool {
+        matches!(self.starts, Starts::Quantiles(_)) && !self.positive || self.is_instant()
+    }
+
     /// Whether it is a value of the argument.
     pub(crate) fn is_value(&self) -> bool {
         matches!(self.starts, Starts::Quantiles(_) | Starts::SizeQuantiles(_))
