@@ -56,7 +56,8 @@ impl Origins {
         let mut all: Vec<Origin> = first.into_iter().map(|s| origin(s, fit)).collect();
         // Beside an effect that was found, a second one is looked for only where a test says that something is left.
         let insignificant = chance(strongest.0) * strongest.1 as f64 > LEFT;
-        let nothing_left = insignificant && !(study.absorbs(fit) && !options.least_squares);
+        let absorbed = !options.least_squares && study.absorbs(fit);
+        let nothing_left = insignificant && !absorbed;
         if stage.accepted > 0 && nothing_left || stage.accepted == MOST {
             all.iter_mut().for_each(|o| o.screen.clear());
             return Self {
