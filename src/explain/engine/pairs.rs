@@ -23,7 +23,14 @@ pub(crate) fn search(question: Question, known: Option<&Fit>) -> Result<Found, E
     let found = forward(question, known, None)?;
     let found = special_case_first(question, &found).unwrap_or(found);
     let gain = found.gain();
-    let least = gain + TIE.0.max(TIE.1 * gain);
+    // A law gives way to two names that are only likelier.
+    let is_law = (found.steps.first().and_then(|s| s.first()))
+        .is_some_and(|f| found.accepted == 1 && named(&question.plant.spec, f) == "law");
+    let tie = match is_law {
+        true => TIE.0,
+        false => TIE.0.max(TIE.1 * gain),
+    };
+    let least = gain + tie;
     let pairs = pairs(question, &found)
         .into_iter()
         .filter(|p| p.gain() > least);
@@ -80,12 +87,13 @@ fn pairs(question: Question, found: &Found) -> Vec<Found> {
     // Little beside a large effect is what its formula leaves, as in `decide`.
     let (strongest, tests) = found.left();
     let nothing_left = chance(strongest) * tests as f64 > LEFT;
-    let little_left = nothing_left || strongest < SECOND.1 * first.gain;
+    let little_left =
+        (nothing_left || strongest < SECOND.1 * first.gain) && !absorbs(question, found);
     // A curve of an input may be that of two effects: its middle and its ends. So may any that is not all.
     let of_input = |f: &Fitted| matches!(f.lead.place, Place::Input(_));
     let is_law = named(spec, first) == "law";
     let is_input_curve = of_input(first) && is_law;
-    let is_not_all = is_law && (!nothing_left || absorbs(question, found));
+    let is_not_all = is_law && !(nothing_left && little_left);
     if little_left && !is_input_curve && !is_not_all || first.hypothesis.is_some() {
         return vec![];
     }

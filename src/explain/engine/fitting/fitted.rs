@@ -8,7 +8,7 @@ use crate::explain::engine::terms::names::{SPECIFIC, name_rank, named, rank, spe
 use crate::explain::engine::terms::term::{Needs, Starts};
 use crate::explain::engine::terms::values::WAVES;
 use crate::physics::ModelSpec;
-use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
+use crate::physics::estimate::{EstimateOptions, Fit, Form, PlantRecording, Study};
 
 /// Gains that differ by less, or by this part of the best, are equal.
 pub(crate) const TIE: (f64, f64) = (6.0, 0.08);
@@ -148,12 +148,16 @@ impl Fitted {
     }
 }
 
-/// A start in its own form and in that of the fit before: where an observer had to follow what was missing, a free run may do now.
+/// A start in its own form and in that of the fit before: where an observer had to follow what was missing, a free run may do now,
+/// and where a free run strays, an observer.
 pub(in crate::explain::engine) fn forms(from: Fit, before: &Fit, gains: usize) -> Vec<Fit> {
     let mut starts = vec![from.clone()];
     if from.form != before.form {
         let mut point = from.point.clone();
-        point.extend(&before.point[before.point.len() - gains..]);
+        match before.form {
+            Form::Innovation => point.extend(&before.point[before.point.len() - gains..]),
+            Form::FreeRun => point.truncate(point.len() - gains),
+        }
         starts.push(Fit {
             form: before.form,
             point,

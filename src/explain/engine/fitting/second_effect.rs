@@ -45,7 +45,7 @@ const APART: [[&str; 2]; 6] = [
     ["leak", "overflow"],
 ];
 
-fn are_apart(one: &str, other: &str) -> bool {
+pub(in crate::explain::engine) fn are_apart(one: &str, other: &str) -> bool {
     APART
         .iter()
         .any(|pair| *pair == [one, other] || *pair == [other, one])

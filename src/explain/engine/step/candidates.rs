@@ -92,7 +92,7 @@ impl Candidates<'_> {
                 .scope
                 .allows(called(spec, l.term, l.place, variables))
         });
-        let (stage, from_text) = (self.stage, self.origins.from_text.as_ref());
+        let from_text = self.origins.from_text.as_ref();
         let starts: Vec<(&Lead, &Fit)> = leads
             .iter()
             .flat_map(|lead| {
@@ -102,28 +102,54 @@ impl Candidates<'_> {
                     .map(move |from| (lead, from))
             })
             .collect();
-        let each = starts.into_par_iter().filter_map(|(lead, from)| {
-            let study = stage.study;
-            let made = candidate(&stage.plant.spec, lead, &screen.arguments, stage.recordings)?;
-            let options = with_more(stage.options, made.values.len());
-            let rough = made.rough(study, MOST_STEPS);
-            let inner = study.of(&rough, &options).ok()?;
-            let free_run = Fit {
-                form: Form::FreeRun,
-                point: from.point[..study.nominal().len()].to_vec(),
-                ..from.clone()
-            };
-            let start = inner.gaussian(&made.from(&free_run, study.parameters()))?;
-            let fit = inner.refit(&start, 1, THOROUGH)?;
+        let each = starts
+            .into_par_iter()
+            .filter_map(|(lead, from)| self.limit(lead, at, from));
+        each.flatten_iter().collect()
+    }
+
+    /// Fits of a limit in free run and with an observer: where something else bends the rate too, a free run reaches the ends at other
+    /// times than the recording.
+    fn limit(&self, lead: &Lead, origin: usize, from: &Fit) -> Option<Vec<Fitted>> {
+        let Stage {
+            plant,
+            study,
+            recordings,
+            ..
+        } = *self.stage;
+        let screen = &self.origins.all[origin].screen;
+        let made = candidate(&plant.spec, lead, &screen.arguments, recordings)?;
+        let options = with_more(self.stage.options, made.values.len());
+        let rough = made.rough(study, MOST_STEPS);
+        let inner = study.of(&rough, &options).ok()?;
+        let numbers = study.nominal().len();
+        let free_run = |from: &Fit, numbers: usize| Fit {
+            form: Form::FreeRun,
+            point: from.point[..numbers].to_vec(),
+            ..from.clone()
+        };
+        let start = made.from(&free_run(from, numbers), study.parameters());
+        let start = inner.gaussian(&start)?;
+        let observed =
+            (inner.along_recording(&start)).and_then(|along| inner.refit(&along, 1, THOROUGH));
+        let from_observed = (observed.as_ref())
+            .and_then(|along| inner.gaussian(&free_run(along, start.point.len())));
+        let best = (std::iter::once(start).chain(from_observed))
+            .filter_map(|start| inner.refit(&start, 1, THOROUGH))
+            .min_by(|a, b| a.criterion.total_cmp(&b.criterion));
+        // Least squares of the free run are not compared with what an observer leaves.
+        let observed = observed.filter(|_| !self.stage.options.least_squares);
+        let fits = best.into_iter().chain(observed);
+        let fitted = fits.filter_map(|fit| {
             self.fit(Glanced {
                 gain: 0.0,
                 lead: lead.clone(),
-                origin: at,
-                candidate: made,
+                origin,
+                candidate: made.clone(),
                 fit,
             })
         });
-        each.collect()
+        Some(fitted.collect())
     }
 
     /// How many times more is tried.

@@ -1,9 +1,9 @@
 //! Where candidates of a step start: score tests along several fits of the plant.
 
 use super::Stage;
-use crate::explain::engine::fitting::second_effect::drop_alike;
-use crate::explain::engine::screening::screen::{Screen, screen};
-use crate::explain::engine::terms::names::named;
+use crate::explain::engine::fitting::second_effect::{are_apart, drop_alike};
+use crate::explain::engine::screening::screen::{Lead, Screen, screen};
+use crate::explain::engine::terms::names::{called, named};
 use crate::explain::engine::thresholds::{FORETOLD, LEFT, MOST, chance};
 use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{Fit, Form};
@@ -119,7 +119,14 @@ fn restrict(screen: &mut Screen, stage: &Stage) {
     stage.scope.restrict(spec, screen);
     if stage.accepted > 0 {
         let least = FORETOLD * stage.needed / stage.study.information();
-        screen.leads.retain(|l| l.statistic >= least);
+        let arguments = &screen.arguments;
+        // What often acts beside the first is fitted in any case.
+        let often = |l: &Lead| {
+            let variables = l.argument.map_or(&[][..], |a| &arguments[a].variables);
+            let id = called(spec, l.term, l.place, variables);
+            (stage.first).is_some_and(|first| are_apart(id, named(stage.given, first)))
+        };
+        screen.leads.retain(|l| l.statistic >= least || often(l));
         screen.curves.retain(|l| l.statistic >= least);
     }
     if let Some(first) = stage.first {

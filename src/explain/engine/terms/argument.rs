@@ -207,6 +207,7 @@ impl Argument {
             return false;
         }
         let both = self.quantile(0.05) < 0.0 && self.quantile(0.95) > 0.0;
+        let turns = self.quantile(0.0) < 0.0 && self.quantile(1.0) > 0.0;
         match needs {
             Needs::Anything => true,
             Needs::BothSigns => both,
@@ -224,11 +225,10 @@ impl Argument {
             Needs::Angle => self.angle,
             Needs::AlongPath => self.angle || self.position && self.variables.len() == 1,
             Needs::Velocity => both && self.velocity,
-            Needs::Directed => {
-                let turns = self.quantile(0.0) < 0.0 && self.quantile(1.0) > 0.0;
-                turns || self.serves(Needs::OneWay)
-            }
-            Needs::OneWay => self.velocity && self.quantile(0.0) * self.quantile(1.0) > 0.0,
+            Needs::Turning => both || self.velocity && turns,
+            Needs::Directed => turns || self.serves(Needs::OneWay),
+            // It may begin at rest.
+            Needs::OneWay => self.velocity && !turns,
             Needs::OwnState | Needs::Integrated => {
                 self.form == ArgumentForm::Variable && !self.held
             }

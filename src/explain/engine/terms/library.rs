@@ -14,7 +14,7 @@ pub(super) const TIMES: &[f64] = &[
 
 use Needs::{
     AboutZero, AlongPath, Angle, Anything, BothSigns, Difference, Directed, Driven, Integrated,
-    OneWay, OwnState, Positive, Radiation, Stretch, SwitchedOn, Time, Velocity,
+    OneWay, OwnState, Positive, Radiation, Stretch, SwitchedOn, Time, Turning, Velocity,
 };
 use Port::{Equation, Input, Parameter, Sensor};
 
@@ -33,6 +33,7 @@ pub(super) const DEAD_ZONE: Shape = shape("d", Starts::SizeQuantiles(&[0.1, 0.3,
 /// A limit on both sides, and an upper one.
 pub(super) const LIMIT: Shape = shape("L", Starts::SizeQuantiles(&[0.6, 0.8, 0.9, 0.97]), true);
 pub(super) const UPPER_LIMIT: Shape = shape("L", Starts::Quantiles(&[0.6, 0.8, 0.9, 0.97]), false);
+pub(super) const LOWER_LIMIT: Shape = shape("L", Starts::Quantiles(&[0.4, 0.2, 0.1, 0.03]), false);
 pub(super) const STOP: Shape = shape("o", Starts::Releases(&[0.03, 0.1]), true);
 pub(super) const HYSTERESIS: Shape = shape("w", Starts::Spread(&[0.1, 0.3, 1.0]), true);
 
@@ -123,7 +124,7 @@ pub(crate) const TERMS: &[Term] = &[
     curve(
         "friction",
         Equation,
-        BothSigns,
+        Turning,
         "tanh({z}/{w})",
         &[shape("w", Starts::Spread(&[0.02, 0.1]), true)],
     ),
@@ -144,7 +145,7 @@ pub(crate) const TERMS: &[Term] = &[
     Term {
         id: "bristles",
         port: Equation,
-        needs: BothSigns,
+        needs: Turning,
         form: "{m}",
         memories: &[Memory {
             rate: "({z} - abs({z})*{m})/{s}",
@@ -411,7 +412,7 @@ pub(crate) const TERMS: &[Term] = &[
         needs: Anything,
         form: "max({z}, {L}) - {z}",
         memories: &[],
-        shapes: &[shape("L", Starts::Quantiles(&[0.4, 0.2, 0.1, 0.03]), false)],
+        shapes: &[LOWER_LIMIT],
         free_strength: false,
         symbol: "",
         units: &[],

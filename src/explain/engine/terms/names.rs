@@ -150,11 +150,10 @@ fn unused(spec: &ModelSpec, v: VariableId) -> bool {
 /// middle, and a load from the beginning on is a constant.
 fn term_in_range(found: &Fitted) -> &'static Term {
     let (from, to) = found.range;
+    let is_plain = found.shapes.len() == 1;
     let id = match (found.lead.term.id, found.shapes.first()) {
-        ("load_step", Some(&at)) if found.shapes.len() == 1 && is_early(at, found.range) => {
-            "load_constant"
-        }
-        ("above", Some(&edge)) if edge <= from + NARROW * (to - from) => "linear",
+        ("load_step", Some(&at)) if is_plain && is_early(at, found.range) => "load_constant",
+        ("above", Some(&edge)) if is_plain && edge <= from + NARROW * (to - from) => "linear",
         ("both_sides", Some(&edge)) if edge < NARROW * from.abs().max(to.abs()) => "linear",
         ("root_above", Some(&edge)) if edge < 0.5 * (from + to) => "root",
         (id, _) => id,

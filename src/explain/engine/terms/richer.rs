@@ -1,8 +1,8 @@
 //! Forms of terms with one shape more, where their physics has one.
 
 use super::library::{
-    ABOVE, BACKLASH, BELOW, DEAD_ZONE, HYSTERESIS, LIMIT, STEP, STICTION, STOP, UPPER_LIMIT,
-    hysteresis,
+    ABOVE, BACKLASH, BELOW, DEAD_ZONE, HYSTERESIS, LIMIT, LOWER_LIMIT, STEP, STICTION, STOP,
+    UPPER_LIMIT, hysteresis,
 };
 use super::term::Needs::{self, AboutZero, Anything, BothSigns, Time};
 use super::term::Port::{self, Equation, Input, Parameter, Sensor};
@@ -10,7 +10,8 @@ use super::term::{Memory, MemoryStart, Shape, Starts, Term, curve, in_place, sam
 
 /// The forms of a term with one shape more: a contact has damping in proportion to its depth (K. H. Hunt and F. R. E. Crossley,
 /// *J. Appl. Mech.* 42, 1975), a flow over a crest a power of its height (3/2 over a weir), and an actuator with play, stiction or
-/// hysteresis a lag; the two sides of limits and dead zones differ, a ramp begins later than the recording, and a change takes time. They keep the name.
+/// hysteresis a lag; the two sides of limits and dead zones differ, a limit has a soft knee, a ramp begins later than the recording, and a
+/// change takes time. They keep the name.
 pub(in crate::explain::engine) fn richer(term: &Term) -> &'static [Term] {
     match (term.id, term.shapes) {
         ("above", _) => ABOVE_MORE,
@@ -23,7 +24,8 @@ pub(in crate::explain::engine) fn richer(term: &Term) -> &'static [Term] {
         ("sensor_drift", _) => DRIFTS,
         ("input_dead_zone", _) => DEAD_ZONE_OF_TWO,
         ("input_saturation", [LIMIT]) => LIMITS_OF_TWO,
-        ("input_saturation", [UPPER_LIMIT]) => UPPER_AND_LOWER,
+        ("input_saturation", [UPPER_LIMIT]) => UPPER_LIMIT_MORE,
+        ("input_saturation", [LOWER_LIMIT]) => LOWER_LIMIT_MORE,
         ("input_backlash", _) => BACKLASH_LAGGING,
         ("valve_stiction", [_]) => SLIP_LAGGING,
         ("valve_stiction", _) => STICTION_LAGGING,
@@ -161,19 +163,43 @@ const DEAD_ZONE_OF_TWO: &[Term] = &[limits(
     &[DEAD_ZONE, OTHER],
     AboutZero,
 )];
-const LIMITS_OF_TWO: &[Term] = &[limits(
+/// How soft a knee is: at the limit so many times `log(2)` are missing.
+const KNEE: Shape = shape("W", Starts::Spread(&[0.05, 0.2]), true);
+const LIMITS_OF_TWO: &[Term] = &[
+    limits(
+        "input_saturation",
+        "min(max({z}, -{L}), {other}) - {z}",
+        &[LIMIT, OTHER],
+        BothSigns,
+    ),
+    limits(
+        "input_saturation",
+        "min(max({z}, -{L}), {L}) - {z} + {W}*(log(1 + exp(-abs({z} + {L})/{W})) - log(1 + exp(-abs({z} - {L})/{W})))",
+        &[LIMIT, KNEE],
+        BothSigns,
+    ),
+];
+const UPPER_LIMIT_MORE: &[Term] = &[
+    limits(
+        "input_saturation",
+        "min(max({z}, {lower}), {L}) - {z}",
+        &[
+            UPPER_LIMIT,
+            shape("lower", Starts::Quantiles(&[0.03, 0.1, 0.2]), false),
+        ],
+        Anything,
+    ),
+    limits(
+        "input_saturation",
+        "min({z}, {L}) - {z} - {W}*log(1 + exp(-abs({z} - {L})/{W}))",
+        &[UPPER_LIMIT, KNEE],
+        Anything,
+    ),
+];
+const LOWER_LIMIT_MORE: &[Term] = &[limits(
     "input_saturation",
-    "min(max({z}, -{L}), {other}) - {z}",
-    &[LIMIT, OTHER],
-    BothSigns,
-)];
-const UPPER_AND_LOWER: &[Term] = &[limits(
-    "input_saturation",
-    "min(max({z}, {lower}), {L}) - {z}",
-    &[
-        UPPER_LIMIT,
-        shape("lower", Starts::Quantiles(&[0.03, 0.1, 0.2]), false),
-    ],
+    "max({z}, {L}) - {z} + {W}*log(1 + exp(-abs({z} - {L})/{W}))",
+    &[LOWER_LIMIT, KNEE],
     Anything,
 )];
 
@@ -241,6 +267,6 @@ mod tests {
             assert_eq!(of(richer), of(simple));
             count += 1;
         }
-        assert_eq!(count, 26);
+        assert_eq!(count, 29);
     }
 }

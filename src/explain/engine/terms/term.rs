@@ -36,6 +36,8 @@ pub(crate) enum Needs {
     Angle,
     /// An angle, or the position of what moves along a line.
     AlongPath,
+    /// Both signs occur, of a velocity however rarely.
+    Turning,
     /// A velocity of both signs.
     Velocity,
     /// A velocity of one sign.
