@@ -52,7 +52,7 @@ impl Noise {
     pub(crate) fn white(residual: &Series, outputs: usize, mask: &Mask) -> Self {
         let mut noise = Self::unit(outputs);
         let squares = noise.squares(residual, mask);
-        noise.fit_scale(&squares);
+        noise.fit_scale(&squares, &vec![0.0; outputs]);
         noise
     }
 
@@ -63,6 +63,18 @@ impl Noise {
         mask: &Mask,
         colours: Colours,
     ) -> Self {
+        Self::estimate_above(residual, mask, colours, &vec![0.0; outputs])
+    }
+
+    /// The same with scales that are no smaller than `least`, one an output: of a recording with few digits most of a residual may be
+    /// exactly zero, and the likelihood of heavy tails has no bound then (C. Fernandez and M. F. J. Steel, *Biometrika* 86, 1999).
+    pub(crate) fn estimate_above(
+        residual: &Series,
+        mask: &Mask,
+        colours: Colours,
+        least: &[f64],
+    ) -> Self {
+        let outputs = least.len();
         let mut noise = Self {
             colours: (0..outputs)
                 .map(|o| estimate::colour(residual, outputs, o, mask, colours))
@@ -71,8 +83,8 @@ impl Noise {
             degrees: f64::INFINITY,
         };
         let squares = noise.squares(residual, mask);
-        noise.fit_scale(&squares);
-        noise.fit_degrees(&squares);
+        noise.fit_scale(&squares, least);
+        noise.fit_degrees(&squares, least);
         noise
     }
 
@@ -182,9 +194,9 @@ impl Noise {
         squares
     }
 
-    /// Scales of largest likelihood for the present filters and degrees of freedom.
-    fn fit_scale(&mut self, squares: &[Vec<f64>]) {
-        for (scale, squares) in self.scale.iter_mut().zip(squares) {
+    /// Scales of largest likelihood, of at least `least`, for the present filters and degrees of freedom.
+    fn fit_scale(&mut self, squares: &[Vec<f64>], least: &[f64]) {
+        for ((scale, squares), least) in self.scale.iter_mut().zip(squares).zip(least) {
             let n = squares.len().max(1) as f64;
             let mut square = squares.iter().sum::<f64>() / n;
             if self.degrees.is_finite() {
@@ -199,12 +211,12 @@ impl Noise {
                     }
                 }
             }
-            *scale = square.sqrt().max(1e-150);
+            *scale = square.sqrt().max(*least).max(1e-150);
         }
     }
 
     /// Gaussian unless the fourth moment says otherwise: the t family is then searched.
-    fn fit_degrees(&mut self, squares: &[Vec<f64>]) {
+    fn fit_degrees(&mut self, squares: &[Vec<f64>], least_scale: &[f64]) {
         let (mut n, mut m2, mut m4) = (0.0, 0.0, 0.0);
         for (squares, scale) in squares.iter().zip(&self.scale) {
             let unit = scale * scale;
@@ -223,7 +235,7 @@ impl Noise {
                 degrees,
                 ..self.clone()
             };
-            trial.fit_scale(squares);
+            trial.fit_scale(squares, least_scale);
             let deviance = squares
                 .iter()
                 .zip(&trial.scale)
@@ -475,5 +487,19 @@ mod tests {
             .sum();
         let literal = squares + 3000.0 * (2.0 * noise.scale[0].ln() + std::f64::consts::TAU.ln());
         assert!((noise.deviance(&series, &mask) - literal).abs() < 1e-8);
+    }
+    /// With three quarters of the values exactly zero the scale of Student's t goes to zero; rounding bounds it.
+    #[test]
+    fn a_scale_is_no_finer_than_the_rounding() {
+        let residual: Series = vec![
+            (0..1000)
+                .map(|k| if k % 8 == 0 { 0.1 } else { 0.0 })
+                .collect(),
+        ];
+        let mask = vec![vec![true; 1000]];
+        let of =
+            |least: f64| Noise::estimate_above(&residual, &mask, Colours::White, &[least]).scale[0];
+        assert!(of(0.0) < 1e-9, "{}", of(0.0));
+        assert_eq!(of(0.03), 0.03);
     }
 }

@@ -228,11 +228,13 @@ fn judge_by_blocks(
     fitted[..=first].rotate_right(1);
 }
 
-/// A term with a name in the place of a curve, of the same variables, that leaves structure: neither is the whole truth then, and of
-/// many values the criterion is for more numbers. The curve stays only where it is better in blocks left out by more than chance.
+/// A term with a name in the place of a curve, of the same variables, that leaves structure or stands beside another effect: neither is
+/// the whole truth then, and of many values the criterion is for more numbers. The curve stays only where it is better in blocks left out
+/// by more than chance. The term must gain `least`.
 fn named_for_curve(
     spec: &ModelSpec,
     step: &[Fitted],
+    least: f64,
     estimator: Estimator,
     recordings: &[PlantRecording],
     hold: Hold,
@@ -240,7 +242,7 @@ fn named_for_curve(
     let curve = step.first().filter(|f| f.lead.curve.is_some())?;
     let term = step.iter().find(|f| {
         let alike = f.lead.place == curve.lead.place && f.depends == curve.depends;
-        alike && f.gain > SURE && f.lead.curve.is_none() && named(spec, f) != "law"
+        alike && f.gain > least && f.lead.curve.is_none() && named(spec, f) != "law"
     })?;
     let errors = |f: &Fitted| held_out(&f.candidate.plant, &f.fit, estimator, recordings, hold);
     let better = errors(curve)?.surely_smaller(&errors(term)?);
@@ -378,8 +380,8 @@ pub(super) fn forward(
         };
         if accepted_so_far == 1 && chance(strongest.0) * (strongest.1 as f64) < LEFT {
             let estimator = objective.estimator();
-            if let Some(term) = named_for_curve(&plant.spec, &steps[0], estimator, recordings, hold)
-            {
+            let term = named_for_curve(&plant.spec, &steps[0], SURE, estimator, recordings, hold);
+            if let Some(term) = term {
                 options.free.truncate(plant.spec.parameters().len());
                 options = with_more(&options, term.candidate.values.len());
                 (now, fit) = (term.candidate.plant.clone(), term.fit.clone());
@@ -399,6 +401,12 @@ pub(super) fn forward(
         }
         tests.push(strongest);
         first_map = first_map.or(map);
+        if accepted_so_far == 1 {
+            let estimator = objective.estimator();
+            let least = needed.max(SURE);
+            let term = named_for_curve(&now.spec, &fitted, least, estimator, recordings, hold);
+            fitted.splice(..0, term);
+        }
         let first = steps.first().and_then(|s| s.first());
         let new = |f: &&Fitted| {
             first.is_none_or(|first| {

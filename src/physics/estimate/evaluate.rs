@@ -189,7 +189,7 @@ fn initial_states(
             let residual = objective
                 .residual(&point)
                 .ok_or_else(|| problem.why_not())?;
-            Noise::estimate(&residual, l, &problem.mask, Colours::All)
+            problem.estimated(&residual, Colours::All)
         }
     };
     if searched {

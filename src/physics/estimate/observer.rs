@@ -80,7 +80,7 @@ fn from_start(problem: &Problem, mut point: Vec<f64>, ranges: &[Range]) -> Optio
         objective.noise = if round < ROUGH {
             Noise::white(&residual, l, &problem.mask)
         } else {
-            Noise::estimate(&residual, l, &problem.mask, Colours::White)
+            problem.estimated(&residual, Colours::White)
         };
         let effort = if round < ROUGH { APPROACH } else { ROUND };
         let Some(deviance) = minimise(&mut objective, &mut point, ranges, effort) else {

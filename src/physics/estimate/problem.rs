@@ -103,6 +103,8 @@ pub(super) struct Problem<'a> {
     pub(super) corrected: Vec<usize>,
     /// Ramps of the switches, for each recording.
     pub(super) plans: Vec<Plan>,
+    /// What rounding takes off the values of each output, as a standard deviation.
+    rounding: Vec<f64>,
     nominal: Point,
 }
 
@@ -203,6 +205,28 @@ fn mask(recordings: &[PlantRecording]) -> Mask {
         .collect()
 }
 
+/// Samples that tell how finely a sensor shows.
+const LOOKED_AT: usize = 4000;
+
+/// What rounding to the smallest difference of two recorded values takes off, as a standard deviation, an output.
+fn rounding(recordings: &[PlantRecording]) -> Vec<f64> {
+    let outputs = recordings.first().map_or(0, |r| r.outputs.len());
+    let of = |output: usize| {
+        let columns = recordings.iter().map(|r| &r.outputs[output]);
+        let every = columns.clone().map(Vec::len).sum::<usize>() / LOOKED_AT + 1;
+        let mut values: Vec<f64> = columns
+            .flat_map(|y| y.iter().step_by(every))
+            .copied()
+            .filter(|v| v.is_finite())
+            .collect();
+        values.sort_unstable_by(f64::total_cmp);
+        let steps = values.windows(2).map(|w| w[1] - w[0]);
+        let least = steps.filter(|d| *d > 0.0).min_by(f64::total_cmp);
+        least.unwrap_or(0.0) / 12f64.sqrt()
+    };
+    (0..outputs).map(of).collect()
+}
+
 /// What Schwarz's criterion adds for numbers that are estimated from so many values, independent ones and all, with the
 /// correction for few values (A. McQuarrie, *Statistics & Probability Letters* 44, 1999).
 pub(super) fn penalty(numbers: usize, independent: f64, values: usize) -> f64 {
@@ -257,6 +281,7 @@ impl<'a> Problem<'a> {
             starts,
             corrected,
             plans: Vec::new(),
+            rounding: rounding(recordings),
             nominal,
         };
         let free = problem.nominal().len();
@@ -304,6 +329,7 @@ impl<'a> Problem<'a> {
             starts: self.starts.clone(),
             corrected: self.corrected.clone(),
             plans: self.plans.clone(),
+            rounding: rounding(recordings),
             nominal: self.nominal.clone(),
         }
     }
@@ -468,8 +494,13 @@ impl<'a> Problem<'a> {
         if self.least_squares() {
             Noise::white(residual, self.outputs(), &self.mask)
         } else {
-            Noise::estimate(residual, self.outputs(), &self.mask, Colours::All)
+            self.estimated(residual, Colours::All)
         }
+    }
+
+    /// Noise model that is estimated, no finer than the values are recorded.
+    pub(crate) fn estimated(&self, residual: &Series, colours: Colours) -> Noise {
+        Noise::estimate_above(residual, &self.mask, colours, &self.rounding)
     }
 
     /// Values of a column that count, whitened as those of an output.

@@ -97,7 +97,7 @@ impl<'a> Study<'a> {
     /// Vogelsang, *J. Econometrics* 88, 1999, on tests whose power falls so).
     pub(crate) fn criterion_in_colour(&self, fit: &Fit) -> Option<f64> {
         let (residual, mask) = (self.residual(fit)?, &self.problem.mask);
-        let noise = Noise::estimate(&residual, self.outputs(), mask, Colours::All);
+        let noise = self.problem.estimated(&residual, Colours::All);
         let numbers = self.problem.nominal().len() + noise.len();
         let values = self.count();
         Some(noise.deviance(&residual, mask) + penalty(numbers, values as f64, values))
@@ -201,12 +201,7 @@ impl<'a> Study<'a> {
             let residual = objective.residual(&point)?;
             objective.noise = match from.form {
                 Form::FreeRun => self.problem.noise(&residual),
-                Form::Innovation => Noise::estimate(
-                    &residual,
-                    self.outputs(),
-                    &self.problem.mask,
-                    Colours::White,
-                ),
+                Form::Innovation => self.problem.estimated(&residual, Colours::White),
             };
             deviance = minimise(&mut objective, &mut point, &ranges, effort)?;
         }
