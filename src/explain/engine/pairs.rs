@@ -22,24 +22,15 @@ const FIRSTS_OF_A_LAW: usize = 2;
 pub(crate) fn search(question: Question, known: Option<&Fit>) -> Result<Found, EstimateError> {
     let found = forward(question, known, None)?;
     let found = special_case_first(question, &found).unwrap_or(found);
-    let gain = found.gain();
-    // A law gives way to two names that are only likelier.
-    let is_law = (found.steps.first().and_then(|s| s.first()))
-        .is_some_and(|f| found.accepted == 1 && named(&question.plant.spec, f) == "law");
-    let tie = match is_law {
-        true => TIE.0,
-        false => TIE.0.max(TIE.1 * gain),
-    };
-    let least = gain + tie;
-    let pairs = pairs(question, &found)
-        .into_iter()
-        .filter(|p| p.gain() > least);
-    let best = pairs.max_by(|a, b| a.gain().total_cmp(&b.gain()));
     let estimator = question.objective.estimator();
     let errors = |of: &Found| {
         let (recordings, hold) = (question.recordings, question.hold);
         held_out(&of.plant, &of.fit, estimator, recordings, hold)
     };
+    let best = pairs(question, &found)
+        .into_iter()
+        .filter(|pair| pair.gain() > found.gain() + tie(&found, pair))
+        .max_by(|a, b| a.gain().total_cmp(&b.gain()));
     let follows = |pair: &Found| {
         let both = errors(pair).zip(errors(&found));
         both.is_some_and(|(pair, single)| pair.over(&single) < 1.0)
@@ -53,6 +44,14 @@ pub(crate) fn search(question: Question, known: Option<&Fit>) -> Result<Found, E
     }
 }
 
+/// By how much a pair must gain more. A law gives way to two names that are only likelier.
+fn tie(found: &Found, pair: &Found) -> f64 {
+    match found.names().contains(&"law") && !pair.names().contains(&"law") {
+        true => TIE.0,
+        false => TIE.0.max(TIE.1 * found.gain()),
+    }
+}
+
 /// Two effects that begin with the special case of the first, where both gain as much: beside the second, the number that the special case
 /// lacks may say nothing.
 fn special_case_first(question: Question, found: &Found) -> Option<Found> {
@@ -61,20 +60,21 @@ fn special_case_first(question: Question, found: &Found) -> Option<Found> {
     let wanted = special_case(named(spec, first)).filter(|_| found.accepted > 1)?;
     let is_wanted = |f: &Fitted| named(spec, f) == wanted && f.lead.place == first.lead.place;
     let at = others.iter().position(is_wanted)?;
-    let simple = forward(question, Some(&found.baseline), Some(begun(found, at + 1))).ok()?;
     let least = found.gain() - tie_with_curve(found.gain());
-    (simple.accepted > 1 && simple.gain() >= least).then_some(simple)
+    with_first(question, found, at + 1).filter(|simple| simple.gain() >= least)
 }
 
-/// The first step of a search with another first effect.
-fn begun(found: &Found, first: usize) -> Step {
+/// Two effects of which the first is another of those that were fitted.
+fn with_first(question: Question, found: &Found, first: usize) -> Option<Found> {
     let mut fitted = found.steps[0].clone();
     fitted[..=first].rotate_right(1);
-    Step {
+    let begun = Step {
         fitted,
         strongest: found.tests[0],
         map: found.map.clone(),
-    }
+    };
+    let pair = forward(question, Some(&found.baseline), Some(begun)).ok()?;
+    (pair.accepted > 1).then_some(pair)
 }
 
 /// Pairs that begin with other first effects, where what was found leaves structure or is a curve of an input.
@@ -139,8 +139,7 @@ fn pairs(question: Question, found: &Found) -> Vec<Found> {
             continue;
         }
         tried.push(other.lead.term.id);
-        let pair = forward(question, Some(&found.baseline), Some(begun(found, i + 1))).ok();
-        pairs.extend(pair.filter(|p| p.accepted > 1));
+        pairs.extend(with_first(question, found, i + 1));
     }
     pairs
 }

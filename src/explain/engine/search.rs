@@ -102,6 +102,16 @@ impl Found {
             .sum()
     }
 
+    /// Names of the effects that were accepted.
+    pub(super) fn names(&self) -> Vec<&'static str> {
+        let accepted = self.steps.iter().take(self.accepted).enumerate();
+        let name = |(i, step): (usize, &Vec<Fitted>)| {
+            let spec = &self.stage(i).0.spec;
+            step.first().map(|f| named(spec, f))
+        };
+        accepted.filter_map(name).collect()
+    }
+
     /// The plant with so many effects, and its fit.
     pub(crate) fn stage(&self, accepted: usize) -> (&Plant, &Fit) {
         match accepted.checked_sub(1) {
