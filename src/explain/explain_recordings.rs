@@ -15,6 +15,7 @@ use super::linear::check::Checked;
 use super::linear::data::Data;
 use super::linear::decision::averaged_decision::attempt;
 use super::linear::decision::output_error_decision::{Finding, inquire};
+use super::linear::fit::Fit;
 use super::linear::known::Known;
 use super::linear::known_simulation::{Simulator, check, know};
 use super::linear::nonlinear_simulator::NonlinearSimulator;
@@ -83,9 +84,9 @@ pub fn explain(
     };
     match simulator {
         Simulator::Linear(known) => {
-            let explanation = explain_linear(*known, &checked, &allowed, options.seed)?;
+            let (explanation, absorbed) = explain_linear(*known, &checked, &allowed, options.seed)?;
             let explanation = unless_refuted(explanation);
-            Ok(second_opinion(explanation, &checked, options))
+            Ok(second_opinion(explanation, absorbed, &checked, options))
         }
         Simulator::Nonlinear(simulator) => {
             let explanation = explain_nonlinear(&simulator, &checked, &allowed, options)?;
@@ -104,12 +105,13 @@ fn no_fit(checked: &Checked) -> ExplainError {
     }
 }
 
+/// The answer relative to a linear plant, and whether noise may stand for physics in it.
 fn explain_linear(
     known: Known,
     checked: &Checked,
     allowed: &Allowed,
     seed: u64,
-) -> Result<Explanation, ExplainError> {
+) -> Result<(Explanation, bool), ExplainError> {
     let drive = attempt(&checked.recordings, &known, allowed);
     // What a law in the averaged equation of a drive explains to noise needs no other way, and the rest little. Where no law
     // was found, the equation may be blind to what there is (effects of the sensor, another mode), and where a spring
@@ -137,12 +139,27 @@ fn explain_linear(
         (None, Some((finding, mask))) => (known, finding, mask),
         (None, None) => return Err(no_fit(checked)),
     };
-    Ok(said(&known, checked, (finding, mask), seed))
+    let absorbed = adds_up(&known, &finding, &mask);
+    Ok((said(&known, checked, (finding, mask), seed), absorbed))
+}
+
+/// Whether noise may stand for physics: a plant that integrates adds up what acts on it, and a noise model with a slow root takes that up.
+fn adds_up(known: &Known, finding: &Finding, mask: &Mask) -> bool {
+    let Fit {
+        noise, residual, ..
+    } = &finding.model;
+    (known.structure.coordinates.given).integrates(known.data.samples())
+        && noise.absorbs(residual, mask)
 }
 
 /// An answer that is not sure is compared with that of the equations that reproduce the simulated outputs, and one that leaves
 /// structure with that of another plant.
-fn second_opinion(explanation: Explanation, checked: &Checked, options: &Options) -> Explanation {
+fn second_opinion(
+    explanation: Explanation,
+    absorbed: bool,
+    checked: &Checked,
+    options: &Options,
+) -> Explanation {
     let mut outputs = checked.recordings.iter().flat_map(|r| &r.outputs);
     let has_units = outputs.all(|o| o.unit.is_some());
     if !checked.troubles.is_empty() {
@@ -155,7 +172,11 @@ fn second_opinion(explanation: Explanation, checked: &Checked, options: &Options
         }
         columns::explain_equations(&equations, checked, &options.without)
     };
-    let unsure = !is_sure(&explanation, has_units);
+    let nothing = matches!(
+        explanation.verdict,
+        Verdict::Consistent | Verdict::Parameters
+    );
+    let unsure = absorbed && nothing || !is_sure(&explanation, has_units);
     let other = unsure.then(by_equations).flatten();
     let explanation = match other.filter(|other| replaces(other, &explanation)) {
         Some(other) => other,

@@ -32,6 +32,9 @@ pub(crate) struct Noise {
     pub(crate) degrees: f64,
 }
 
+/// Part of the mean square of a residual that a noise model leaves, at most, where it may stand for physics.
+const ABSORBED: f64 = 0.1;
+
 /// A column a recording and output (`recording * outputs + output`): residuals, simulated outputs, weights.
 pub(crate) type Series = Vec<Vec<f64>>;
 
@@ -86,6 +89,13 @@ impl Noise {
         noise.fit_scale(&squares, least);
         noise.fit_degrees(&squares, least);
         noise
+    }
+
+    /// Whether the colours of this noise model take up most of a residual, so that they may stand for physics.
+    pub(crate) fn absorbs(&self, residual: &Series, mask: &Mask) -> bool {
+        let white = Self::white(residual, self.scale.len(), mask);
+        let mut each = white.scale.iter().zip(&self.scale);
+        each.any(|(whole, new)| new * new < ABSORBED * whole * whole)
     }
 
     /// Numbers that the noise model has.

@@ -262,3 +262,26 @@ fn an_input_with_two_limits_that_differ_is_no_curve() {
         "{lower} {upper}"
     );
 }
+
+/// The iron of a magnet saturates softly: a limit with a knee, not a curve without a name.
+#[test]
+fn a_limit_with_a_soft_knee_is_a_saturation() {
+    let current = levels(25, 0.2, 3.0);
+    let log = recorded(
+        "i,v",
+        (1200, 0.1),
+        &[&current],
+        |x, u, _| {
+            vec![(4.0 * 1.6 * (1.0 - (-(u[0] / 1.6).powi(4)).exp()).powf(0.25) - 2.0 * x[0]) / 1.5]
+        },
+        (&[0.4], &[(0, 0.01)]),
+    );
+    let said = explained(
+        &Folder::new(),
+        &log,
+        "model Magnet\n  parameter Real k(unit=\"N/A\", min=2, max=6) = 3.5;\n  parameter Real d(unit=\"N.s/m\", min=1, max=4) = 2.2;\n  parameter Real m(unit=\"kg\") = 1.5;\n  input Real i(unit=\"A\");\n  output Real v(unit=\"m/s\");\n  Real w(unit=\"m/s\", start=0.4);\nequation\n  m*der(w) = k*i - d*w;\n  v = w;\nend Magnet;\n",
+    );
+    assert_eq!(effects(&said), ["input_saturation"], "{}", said["summary"]);
+    let limit = number(&said, 0, "input_saturation_L");
+    assert!((limit - 1.6).abs() < 0.15, "{limit}");
+}

@@ -151,3 +151,40 @@ fn a_dead_zone_and_a_limit_may_be_of_one_input() {
         said["summary"]
     );
 }
+
+/// A scooter with rolling friction and drag that rarely rolls backwards: a curve of the speed is what both together do.
+#[test]
+fn friction_and_drag_are_two_names_for_a_curve_of_the_speed() {
+    for (every, low, high) in [(60, -80.0, 200.0), (45, -60.0, 180.0)] {
+        let force = levels(every, low, high);
+        let log = recorded(
+            "F,v",
+            (1500, 0.1),
+            &[&force],
+            |x, u, _| {
+                let friction = 9.0 * (x[0] / 0.01).tanh() + 0.55 * x[0] * x[0].abs();
+                vec![(u[0] - friction) / 110.0]
+            },
+            (&[0.0], &[(0, 0.05)]),
+        );
+        let said = explained(
+            &Folder::new(),
+            &log,
+            "model Scooter\n  parameter Real m(unit=\"kg\", min=80, max=140) = 100;\n  input Real F(unit=\"N\");\n  output Real v(unit=\"m/s\");\n  Real w(unit=\"m/s\", start=0);\nequation\n  m*der(w) = F;\n  v = w;\nend Scooter;\n",
+        );
+        let mut names = effects(&said);
+        names.sort_unstable();
+        assert_eq!(
+            names,
+            ["coulomb_friction", "quadratic_drag"],
+            "{}",
+            said["summary"]
+        );
+        let drag = effects(&said)
+            .iter()
+            .position(|e| *e == "quadratic_drag")
+            .unwrap();
+        let value = number(&said, drag, "signed_square_c");
+        assert!((value + 0.55).abs() < 0.02, "{value}");
+    }
+}

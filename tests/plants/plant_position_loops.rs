@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use crate::folder::{Folder, effects};
 use crate::plant_initial_states::noise;
+use crate::plant_neighbours::{levels, recorded};
 
 const STEP: f64 = 0.01;
 /// Steps of the truth in a sample.
@@ -85,4 +86,30 @@ fn friction_and_a_load_that_comes_later() {
         "{}",
         said["summary"]
     );
+}
+
+/// An axis that no spring brings back, with columns in place of equations: its simulation drifts away, so that a noise model with a slow
+/// root takes up what cogging does. Nothing is missing for that model; the equations that reproduce the columns say what is.
+#[test]
+fn cogging_of_an_axis_that_drifts_is_no_noise() {
+    let volt = levels(15, -3.0, 3.0);
+    let axis = |cogging: f64, noise: f64| {
+        recorded(
+            "volt [V],pan [deg]",
+            (3000, 0.004),
+            &[&volt],
+            |x, u, _| {
+                let rate = x[1].to_degrees();
+                let turned = (x[0] / 15.0 * std::f64::consts::TAU).sin();
+                vec![rate, (0.3 * u[0] - 0.12 * x[1] - cogging * turned) / 0.02]
+            },
+            (&[0.0, 0.0], &[(0, noise)]),
+        )
+    };
+    let folder = Folder::new();
+    folder.text("log.csv", &axis(0.06, 0.2));
+    folder.text("simulation.csv", &axis(0.0, 0.0));
+    let columns = ["--inputs", "volt [V]", "--outputs", "pan [deg]"];
+    let said = folder.explained("log.csv", "simulation.csv", &columns);
+    assert_eq!(effects(&said), ["cogging"], "{}", said["summary"]);
 }

@@ -139,3 +139,47 @@ fn beside_a_stop_friction_keeps_its_simple_form() {
         said["summary"]
     );
 }
+
+/// A stairlift that is faster downhill than uphill, between two ends, measured with a tape of 5 cm: the free run of either effect alone
+/// reaches the ends at other times than the recording.
+#[test]
+fn the_ends_of_a_travel_are_found_beside_an_asymmetry() {
+    let command = levels(35, -100.0, 100.0);
+    let clean = recorded(
+        "pwm,x",
+        (1500, 0.2),
+        &[&command],
+        |x, u, _| {
+            let rate = if u[0] > 0.0 { 0.0021 } else { 0.0028 };
+            vec![within(rate * u[0], x[0], (0.2, 6.8))]
+        },
+        (&[3.0], &[(0, 0.004)]),
+    );
+    let mut log = String::from("t,pwm,x\n");
+    for line in clean.lines().skip(1) {
+        let (others, x) = line.rsplit_once(',').unwrap();
+        let x: f64 = x.parse().unwrap();
+        log.push_str(&format!("{others},{:.2}\n", (x / 0.05).round() * 0.05));
+    }
+    let said = explained(
+        &Folder::new(),
+        &log,
+        "model Lift\n  parameter Real k(unit=\"m/s\") = 0.0025;\n  input Real pwm;\n  output Real x(unit=\"m\");\n  Real s(unit=\"m\", start=3);\nequation\n  der(s) = k*pwm;\n  x = s;\nend Lift;\n",
+    );
+    let mut names = effects(&said);
+    names.sort_unstable();
+    assert_eq!(
+        names,
+        ["end_stop", "input_asymmetry"],
+        "{}",
+        said["summary"]
+    );
+    let stop = effects(&said)
+        .iter()
+        .position(|e| *e == "end_stop")
+        .unwrap();
+    for (name, value) in [("limit_lower", 0.2), ("limit_upper", 6.8)] {
+        let end = number(&said, stop, name);
+        assert!((end - value).abs() < 0.02, "{name}: {end}");
+    }
+}

@@ -13,8 +13,6 @@ use crate::physics::simulation::{Hold, Observer, Plan, Plant, Point, Trajectory}
 
 /// Part of the information of single numbers below which a direction changes no prediction: the accuracy of derivatives, squared.
 const UNCHANGED: f64 = 1e-9;
-/// Part of the mean square of a residual that a noise model leaves, at most, where it may stand for physics.
-const ABSORBED: f64 = 0.1;
 /// A free run whose error is more than twice that of an observer strays: the logarithm of the ratio of their variances.
 const STRAYS: f64 = 1.386;
 
@@ -343,12 +341,8 @@ impl<'a> Study<'a> {
     /// Whether the noise model foretells nearly all of what the free run leaves of an output: it may stand for physics, and no test after
     /// it says that none is missing.
     pub(crate) fn absorbs(&self, fit: &Fit) -> bool {
-        let white = self.gaussian(fit).filter(|f| f.form == Form::FreeRun);
-        white.is_some_and(|white| {
-            let each = white.noise.scale.iter().zip(&fit.noise.scale);
-            each.into_iter()
-                .any(|(whole, new)| new * new < ABSORBED * whole * whole)
-        })
+        fit.form == Form::FreeRun
+            && (self.residual(fit)).is_some_and(|r| fit.noise.absorbs(&r, self.mask()))
     }
 
     /// By how many standard deviations a number differs from 0 with all others free, whatever their bounds, but for directions in which

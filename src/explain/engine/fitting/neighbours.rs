@@ -17,13 +17,18 @@ use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH, l
 use crate::physics::estimate::{Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Unknown};
 
-/// The richer form of a fit's term that fits best, where that gains what ties do not explain. What the simple form leaves would else
-/// be taken for a second effect.
+/// The richer form of a fit's term that fits best, or that of this again, where that gains what ties do not explain. What the simple form
+/// leaves would else be taken for a second effect.
 pub(in crate::explain::engine) fn richer_form(
     fitted: &Fitted,
     arguments: &[Argument],
     ground: &Ground,
 ) -> Option<Fitted> {
+    let richer = with_one_shape_more(fitted, arguments, ground)?;
+    Some(with_one_shape_more(&richer, arguments, ground).unwrap_or(richer))
+}
+
+fn with_one_shape_more(fitted: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Fitted> {
     let argument = fitted.lead.argument.map(|a| &arguments[a]);
     let begun = |term: &'static Term| -> Vec<(&'static Term, f64)> {
         let new = term.shapes.last().map(|shape| shape.starts);
@@ -33,7 +38,7 @@ pub(in crate::explain::engine) fn richer_form(
             .map(|start| (term, start))
             .collect()
     };
-    let each: Vec<(&Term, f64)> = richer(fitted.lead.term).iter().flat_map(begun).collect();
+    let each: Vec<(&Term, f64)> = richer(fitted.lead.term).flat_map(begun).collect();
     let glanced = each.into_par_iter().filter_map(|(term, start)| {
         let shapes = [&fitted.shapes[..], &[start]].concat();
         let strength = match term.free_strength {

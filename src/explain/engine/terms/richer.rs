@@ -12,7 +12,17 @@ use super::term::{Memory, MemoryStart, Shape, Starts, Term, curve, in_place, sam
 /// *J. Appl. Mech.* 42, 1975), a flow over a crest a power of its height (3/2 over a weir), and an actuator with play, stiction or
 /// hysteresis a lag; the two sides of limits and dead zones differ, a limit has a soft knee, a ramp begins later than the recording, and a
 /// change takes time. They keep the name.
-pub(in crate::explain::engine) fn richer(term: &Term) -> &'static [Term] {
+pub(in crate::explain::engine) fn richer(term: &Term) -> impl Iterator<Item = &'static Term> {
+    let shapes = term.shapes;
+    let is_next = move |richer: &&Term| {
+        let others = richer.shapes.split_last().map(|(_, others)| others);
+        others == Some(shapes)
+    };
+    all_richer(term).iter().filter(is_next)
+}
+
+/// Those of a form and of its richer ones.
+fn all_richer(term: &Term) -> &'static [Term] {
     match (term.id, term.shapes) {
         ("above", _) => ABOVE_MORE,
         ("below", _) => BELOW_MORE,
@@ -125,11 +135,15 @@ const fn courses(id: &'static str, port: Port) -> [Term; 3] {
         curve(id, port, Time, line, &[STEP, DURATION]),
     ]
 }
-/// A ramp that begins later, and one that flattens.
-const fn ramps(id: &'static str, port: Port) -> [Term; 2] {
+/// A ramp that begins later, one that flattens, and ramps that do both.
+const fn ramps(id: &'static str, port: Port) -> [Term; 4] {
+    const FLATTENS: &str = "{T}*(1.0 - exp(-max(time - {t0}, 0)/{T}))";
+    const ENDS: &str = "min(max(time - {t0}, 0), {T})";
     [
         curve(id, port, Time, "max(time - {t0}, 0)", &[BEGIN]),
         curve(id, port, Time, "1.0 - exp(-time/{T})", &[DURATION]),
+        curve(id, port, Time, FLATTENS, &[BEGIN, DURATION]),
+        curve(id, port, Time, ENDS, &[BEGIN, DURATION]),
     ]
 }
 const LOAD_COURSES: &[Term] = &courses("load_step", Equation);
@@ -253,9 +267,7 @@ mod tests {
     /// The shapes that a fit of the simple form has are those that the richer one begins with.
     #[test]
     fn a_richer_form_has_one_shape_more() {
-        let pairs = TERMS
-            .iter()
-            .flat_map(|t| richer(t).iter().map(move |r| (t, r)));
+        let pairs = TERMS.iter().flat_map(|t| richer(t).map(move |r| (t, r)));
         let mut count = 0;
         for (simple, richer) in pairs {
             let (last, others) = richer.shapes.split_last().unwrap();
@@ -268,5 +280,8 @@ mod tests {
             count += 1;
         }
         assert_eq!(count, 29);
+        let ramp = TERMS.iter().find(|t| t.id == "parameter_ramp").unwrap();
+        let late = richer(ramp).find(|t| t.shapes == [BEGIN]).unwrap();
+        assert_eq!(richer(late).count(), 2);
     }
 }

@@ -34,6 +34,14 @@ impl Plant {
         slowest.is_some_and(|pole| pole.im.abs() > TURNS * pole.re.abs())
     }
 
+    /// Whether a pole has a time constant longer than three recordings of so many samples: what disturbs the plant adds up.
+    pub(crate) fn integrates(&self, samples: usize) -> bool {
+        const RECORDINGS: f64 = 3.0;
+        let slowest = (-1.0 / (RECORDINGS * samples.max(1) as f64)).exp();
+        let poles = self.a_matrix().complex_eigenvalues();
+        self.states > 0 && poles.iter().any(|pole| pole.norm() > slowest)
+    }
+
     pub(crate) fn from_state_space(system: &StateSpace) -> Self {
         Self {
             states: system.states(),
