@@ -3,7 +3,7 @@
 use super::fitting::edit::Place;
 use super::fitting::fitted::{Fitted, TIE, tie_with_curve};
 use super::holdout::held_out;
-use super::search::{Found, Question, forward};
+use super::search::{Found, HALF_WAY, Question, forward};
 use super::step::Step;
 use super::terms::documentation::PLANT_EFFECTS;
 use super::terms::names::{family, named, special_case};
@@ -14,6 +14,9 @@ use crate::physics::estimate::{EstimateError, Fit, Study};
 const OTHER_FIRSTS: usize = 4;
 /// ... and in place of a law.
 const FIRSTS_OF_A_LAW: usize = 2;
+
+/// A free run that leaves less of the variance than this, a fit of 90 %, is close.
+const CLOSE: f64 = 0.01;
 
 /// What the equations leave out. The fit of the plant alone may be known.
 ///
@@ -87,18 +90,19 @@ fn pairs(question: Question, found: &Found) -> Vec<Found> {
     // Little beside a large effect is what its formula leaves, as in `decide`.
     let (strongest, tests) = found.left();
     let nothing_left = chance(strongest) * tests as f64 > LEFT;
-    let little_left =
-        (nothing_left || strongest < SECOND.1 * first.gain) && !absorbs(question, found);
+    let absorbed = absorbs(question, found);
+    let little_left = nothing_left || strongest < SECOND.1 * first.gain && !absorbed;
     // A curve of an input may be that of two effects: its middle and its ends. So may any that is not all.
     let of_input = |f: &Fitted| matches!(f.lead.place, Place::Input(_));
     let is_law = named(spec, first) == "law";
     let is_input_curve = of_input(first) && is_law;
-    let is_not_all = is_law && !(nothing_left && little_left);
+    // Nor is a curve all that needs a second effect beside it.
+    let is_not_all = is_law && (!nothing_left || absorbed || found.accepted > 1);
     if little_left && !is_input_curve && !is_not_all || first.hypothesis.is_some() {
         return vec![];
     }
     let least = match is_input_curve || is_not_all {
-        true => NEEDED,
+        true => HALF_WAY * NEEDED,
         false => NEEDED.max(IMITATED * first.gain),
     };
     let id = |f: &Fitted| named(spec, f);
@@ -144,8 +148,11 @@ fn pairs(question: Question, found: &Found) -> Vec<Found> {
     pairs
 }
 
-/// Whether the noise model of what was found may stand for physics.
+/// Whether the noise model of what was found may stand for physics: it takes up most of what is left, and that is not little.
 fn absorbs(question: Question, found: &Found) -> bool {
     let study = Study::new(&found.plant, question.recordings, &found.options);
-    study.is_ok_and(|study| study.absorbs(&found.fit))
+    study.is_ok_and(|study| {
+        let left = study.left(&found.fit).unwrap_or_default();
+        left.iter().any(|left| *left > CLOSE) && study.absorbs(&found.fit)
+    })
 }

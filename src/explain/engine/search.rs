@@ -161,7 +161,7 @@ impl Found {
 
 /// Part of the gain that an effect needs from which on it is on trial: it stands if a second beside it gains what both need together.
 /// One of two alone may say little, where the other one hides it.
-const HALF_WAY: f64 = 0.5;
+pub(super) const HALF_WAY: f64 = 0.5;
 
 /// What blocks left out say of free runs, where values that depend on each other make a criterion weak. A candidate is accepted if it
 /// takes more than half of the mean square off them, and the criterion speaks for it more than chance does, or it is likelier with noise

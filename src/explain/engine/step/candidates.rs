@@ -92,25 +92,21 @@ impl Candidates<'_> {
                 .scope
                 .allows(called(spec, l.term, l.place, variables))
         });
-        let from_text = self.origins.from_text.as_ref();
-        let starts: Vec<(&Lead, &Fit)> = leads
-            .iter()
-            .flat_map(|lead| {
-                from_text
-                    .into_iter()
-                    .chain([fit])
-                    .map(move |from| (lead, from))
-            })
+        // An observer finds the same from wherever it starts.
+        let from = [(fit, self.origins.strays)].into_iter();
+        let from = from.chain(self.origins.from_text.iter().map(|text| (text, false)));
+        let starts: Vec<(&Lead, (&Fit, bool))> = (leads.iter())
+            .flat_map(|lead| from.clone().map(move |from| (lead, from)))
             .collect();
         let each = starts
             .into_par_iter()
-            .filter_map(|(lead, from)| self.limit(lead, at, from));
+            .filter_map(|(lead, (from, observed))| self.limit(lead, at, from, observed));
         each.flatten_iter().collect()
     }
 
-    /// Fits of a limit in free run and with an observer: where something else bends the rate too, a free run reaches the ends at other
-    /// times than the recording.
-    fn limit(&self, lead: &Lead, origin: usize, from: &Fit) -> Option<Vec<Fitted>> {
+    /// Fits of a limit in free run, and with an observer where a free run strays: where something else bends the rate too, it reaches the
+    /// ends at other times than the recording.
+    fn limit(&self, lead: &Lead, origin: usize, from: &Fit, observed: bool) -> Option<Vec<Fitted>> {
         let Stage {
             plant,
             study,
@@ -130,8 +126,10 @@ impl Candidates<'_> {
         };
         let start = made.from(&free_run(from, numbers), study.parameters());
         let start = inner.gaussian(&start)?;
-        let observed =
-            (inner.along_recording(&start)).and_then(|along| inner.refit(&along, 1, THOROUGH));
+        let observed = observed
+            .then(|| inner.along_recording(&start))
+            .flatten()
+            .and_then(|along| inner.refit(&along, 1, THOROUGH));
         let from_observed = (observed.as_ref())
             .and_then(|along| inner.gaussian(&free_run(along, start.point.len())));
         let best = (std::iter::once(start).chain(from_observed))

@@ -23,6 +23,8 @@ pub(super) struct Origins {
     pub(super) map: Option<EquationMap>,
     /// A free run from the values of the text, before effects were found.
     pub(super) from_text: Option<Fit>,
+    /// Whether the free run strays from the recording.
+    pub(super) strays: bool,
 }
 
 impl Origins {
@@ -65,6 +67,7 @@ impl Origins {
                 strongest,
                 map,
                 from_text,
+                strays: false,
             };
         }
         // A noise model that was fitted where physics is missing absorbs it: the same again under white noise.
@@ -77,8 +80,12 @@ impl Origins {
         }
         // Where a free run strays from the recording, what a term would do depends on where the recording was. That an observer
         // follows the noise too is of no matter for where fits start, but would be for the test above.
-        if let Some(white) = free_run.or_else(|| from_text.clone())
-            && let Some(along) = study.along_recording(&white)
+        let white = free_run.or_else(|| from_text.clone());
+        let along = white
+            .as_ref()
+            .and_then(|white| study.along_recording(white));
+        let strays = along.is_some();
+        if let Some((white, along)) = white.zip(along)
             && let Some(mut s) = screened(&white, &along)
         {
             // What depends on inputs or time alone is the same along both, and what a sensor would show along the recording is the
@@ -109,6 +116,7 @@ impl Origins {
             strongest,
             map,
             from_text,
+            strays,
         }
     }
 }
@@ -120,11 +128,15 @@ fn restrict(screen: &mut Screen, stage: &Stage) {
     if stage.accepted > 0 {
         let least = FORETOLD * stage.needed / stage.study.information();
         let arguments = &screen.arguments;
-        // What often acts beside the first is fitted in any case.
+        // What often acts beside the first, as a function of the same, is fitted in any case.
         let often = |l: &Lead| {
             let variables = l.argument.map_or(&[][..], |a| &arguments[a].variables);
             let id = called(spec, l.term, l.place, variables);
-            (stage.first).is_some_and(|first| are_apart(id, named(stage.given, first)))
+            stage.first.is_some_and(|first| {
+                l.place == first.lead.place
+                    && spec.names(variables) == first.depends
+                    && are_apart(id, named(stage.given, first))
+            })
         };
         screen.leads.retain(|l| l.statistic >= least || often(l));
         screen.curves.retain(|l| l.statistic >= least);

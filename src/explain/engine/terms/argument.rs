@@ -1,5 +1,7 @@
 //! What a missing term may be a function of, with its values along the recordings.
 
+use std::f64::consts::TAU;
+
 use crate::physics::{
     Binary, Equation, ExpressionId, ModelSpec, Node, Unknown, VariableId, VariableKind,
 };
@@ -37,7 +39,10 @@ pub(crate) struct Argument {
     pub(crate) is_difference: bool,
     /// Its derivative, where the plant has variables for that.
     pub(crate) rate: Option<String>,
+    /// In radians.
     pub(crate) angle: bool,
+    /// One turn of an angle, in its unit.
+    pub(crate) turn: Option<f64>,
     pub(crate) velocity: bool,
     pub(crate) position: bool,
     /// Changes at samples only: it is made of inputs.
@@ -74,6 +79,11 @@ impl Argument {
         let held = variables
             .iter()
             .all(|&v| spec.variable(v).kind == VariableKind::Input);
+        let turn = match variables[..] {
+            [v] if unit(v) == "rad" || may_be_angle(spec, &[v]) => Some(TAU),
+            [v] if unit(v) == "deg" => Some(360.0),
+            _ => None,
+        };
         Self {
             form: ArgumentForm::Variable,
             velocity: is_velocity(spec, &variables)
@@ -81,8 +91,8 @@ impl Argument {
                     && variables
                         .iter()
                         .all(|&v| spec.variable(v).kind != VariableKind::Input),
-            angle: variables.len() == 1
-                && (unit(variables[0]) == "rad" || may_be_angle(spec, &variables)),
+            angle: turn == Some(TAU),
+            turn,
             position: is_position(spec, &variables),
             is_difference: variables.len() == 1 && moves_apart(spec, variables[0]),
             rate: rate(spec, &variables),

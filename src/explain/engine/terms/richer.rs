@@ -179,6 +179,9 @@ const DEAD_ZONE_OF_TWO: &[Term] = &[limits(
 )];
 /// How soft a knee is: at the limit so many times `log(2)` are missing.
 const KNEE: Shape = shape("W", Starts::Spread(&[0.05, 0.2]), true);
+/// ... of both signs, with a power (C. Rapp, *Proc. 2nd European Conf. on Satellite Communications*, 1991).
+const RAPP: &str = "{z}/(1 + abs({z}/{L})^{p})^(1/{p}) - {z}";
+const SHARPNESS: Shape = shape("p", Starts::Powers(&[2.0]), true);
 const LIMITS_OF_TWO: &[Term] = &[
     limits(
         "input_saturation",
@@ -192,6 +195,7 @@ const LIMITS_OF_TWO: &[Term] = &[
         &[LIMIT, KNEE],
         BothSigns,
     ),
+    limits("input_saturation", RAPP, &[LIMIT, SHARPNESS], BothSigns),
 ];
 const UPPER_LIMIT_MORE: &[Term] = &[
     limits(
@@ -207,6 +211,12 @@ const UPPER_LIMIT_MORE: &[Term] = &[
         "input_saturation",
         "min({z}, {L}) - {z} - {W}*log(1 + exp(-abs({z} - {L})/{W}))",
         &[UPPER_LIMIT, KNEE],
+        Anything,
+    ),
+    limits(
+        "input_saturation",
+        RAPP,
+        &[UPPER_LIMIT, SHARPNESS],
         Anything,
     ),
 ];
@@ -279,7 +289,7 @@ mod tests {
             assert_eq!(of(richer), of(simple));
             count += 1;
         }
-        assert_eq!(count, 29);
+        assert_eq!(count, 31);
         let ramp = TERMS.iter().find(|t| t.id == "parameter_ramp").unwrap();
         let late = richer(ramp).find(|t| t.shapes == [BEGIN]).unwrap();
         assert_eq!(richer(late).count(), 2);

@@ -1,5 +1,7 @@
 //! Values of terms along recordings, from the text of the terms.
 
+use std::f64::consts::TAU;
+
 use crate::explain::engine::fitting::edit::literal;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::term::{MEMORIES, Memory, MemoryStart, Starts, Term};
@@ -63,14 +65,14 @@ pub(in crate::explain::engine) fn starts(
 /// Wave numbers with every half period more in the range of an argument: one between two of them goes out of step with neither. Of an
 /// angle also the whole ones beyond these that machines have. As far as samples resolve them.
 fn waves(along: &Argument, sample_time: f64) -> Vec<f64> {
-    const TURN: f64 = 2.0 * std::f64::consts::PI;
-    let half = 0.5 * TURN / along.range();
+    let half = 0.5 * TAU / along.range();
     let most = f64::from(2 * PERIODS) * half;
-    let resolved = 0.5 * TURN / (sample_time * along.rate_size(sample_time));
-    let beyond = IN_A_TURN.iter().filter(|k| along.angle && **k > most);
+    let resolved = 0.5 * TAU / (sample_time * along.rate_size(sample_time));
+    let of_turn = |turn: f64| IN_A_TURN.map(|k| k * TAU / turn);
+    let beyond = along.turn.map(of_turn).into_iter().flatten();
     let halves = (2..=2 * PERIODS).map(|n| f64::from(n) * half);
     halves
-        .chain(beyond.copied())
+        .chain(beyond.filter(|k| *k > most))
         .filter(|k| *k < resolved)
         .collect()
 }
