@@ -145,7 +145,14 @@ fn beside_a_stop_friction_keeps_its_simple_form() {
 #[test]
 fn the_ends_of_a_travel_are_found_beside_an_asymmetry() {
     let varied = levels(35, -50.0, 50.0);
-    let command = |k: usize| varied(k) + if (k / 250) % 2 == 0 { 60.0 } else { -60.0 };
+    let command = |k: usize| {
+        varied(k)
+            + if (k / 250).is_multiple_of(2) {
+                60.0
+            } else {
+                -60.0
+            }
+    };
     let clean = recorded(
         "pwm,x",
         (1500, 0.2),
