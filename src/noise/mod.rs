@@ -501,11 +501,7 @@ mod tests {
     /// With three quarters of the values exactly zero the scale of Student's t goes to zero; rounding bounds it.
     #[test]
     fn a_scale_is_no_finer_than_the_rounding() {
-        let residual: Series = vec![
-            (0..1000)
-                .map(|k| if k < 125 { 0.1 } else { 0.0 })
-                .collect(),
-        ];
+        let residual: Series = vec![(0..1000).map(|k| if k < 125 { 0.1 } else { 0.0 }).collect()];
         let mask = vec![vec![true; 1000]];
         let of =
             |least: f64| Noise::estimate_above(&residual, &mask, Colours::White, &[least]).scale[0];
