@@ -137,7 +137,7 @@ fn tanks_that_overflow() {
     let said = said(tanks.sample_time, &u, &with_noise(&clean, 0.03, 4));
     assert_eq!(
         effects(&said),
-        ["tank_outflow", "overflow"],
+        ["tank_outflow", "overflow", "overflow"],
         "{}",
         said["summary"]
     );

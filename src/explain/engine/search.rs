@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::fitting::eliminate::alone;
 use super::fitting::fitted::{Fitted, TIE, with_more};
-use super::fitting::second_effect::{determined, differs};
+use super::fitting::second_effect::{determined, differs, repeats_elsewhere};
 use super::holdout::{EXPLAINED, Estimator, HeldOut, held_out};
 use super::hypothesis::Trial;
 use super::long_recordings::Searched;
@@ -418,13 +418,26 @@ pub(super) fn forward(
             fitted.splice(..0, term);
         }
         let first = steps.first().and_then(|s| s.first());
+        let explains_beside = |f: &Fitted| {
+            let runs = |plant: &Plant, fit: &Fit| {
+                held_out(plant, fit, Estimator::FreeRun, recordings, hold)
+            };
+            runs(&f.candidate.plant, &f.fit).is_some_and(|with| {
+                let removed = |without| with.removed(&without) >= EXPLAINED;
+                with.follows_closely() && runs(&now, &fit).is_some_and(removed)
+            })
+        };
         let new = |f: &&Fitted| {
             first.is_none_or(|first| {
                 let id = named(&now.spec, f);
                 let first = (first, named(&plant.spec, first));
-                f.hypothesis.is_some()
-                    || differs(id, f.lead.term.port, &f.depends, first)
-                        && determined(&study, f, &options)
+                let is_another = || {
+                    differs(id, f.lead.term.port, &f.depends, first)
+                        || f.gain > needed
+                            && repeats_elsewhere((f, id), first)
+                            && explains_beside(f)
+                };
+                f.hypothesis.is_some() || is_another() && determined(&study, f, &options)
             })
         };
         // What may not be named beside the first, but gains more, may stand in its place.
@@ -432,17 +445,7 @@ pub(super) fn forward(
         let best = fitted.first().filter(|f| new(f) || instead(f));
         // Of a second effect that is small beside a large first one, blocks left out say whether it is what the formula of the first
         // leaves.
-        let shows = |f: &Fitted| {
-            let runs = |plant: &Plant, fit: &Fit| {
-                held_out(plant, fit, Estimator::FreeRun, recordings, hold)
-            };
-            let is_more = count > 0 && f.gain > SECOND.0 && new(&f);
-            is_more
-                && runs(&f.candidate.plant, &f.fit).is_some_and(|with| {
-                    let removed = |without| with.removed(&without) >= EXPLAINED;
-                    with.follows_closely() && runs(&now, &fit).is_some_and(removed)
-                })
-        };
+        let shows = |f: &Fitted| count > 0 && f.gain > SECOND.0 && new(&f) && explains_beside(f);
         let accepted = best
             .filter(|f| (f.gain > needed || f.explains || shows(f)) && count < MOST)
             .cloned();

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::wrapped;
-use crate::explain::{Explanation, HypothesisVerdict, Verdict};
+use super::{listed, wrapped};
+use crate::explain::{EffectFound, Explanation, HypothesisVerdict, Verdict};
 
 /// Verdict and summary.
 pub fn explanation_text(explanation: &Explanation) -> String {
@@ -14,13 +14,20 @@ pub fn explanation_text(explanation: &Explanation) -> String {
         Verdict::Family => "FAMILY",
         Verdict::Unexplained => "UNEXPLAINED",
     };
-    let names: Vec<String> = explanation
-        .effects
-        .iter()
-        .map(|e| e.effect.replace('_', " "))
-        .collect();
+    let same = |e: &EffectFound| {
+        explanation
+            .effects
+            .iter()
+            .filter(|o| o.effect == e.effect)
+            .count()
+    };
+    let name = |e: &EffectFound| match (same(e), &e.enters) {
+        (2.., Some(place)) => format!("{} of {place}", e.effect.replace('_', " ")),
+        _ => e.effect.replace('_', " "),
+    };
+    let names: Vec<String> = explanation.effects.iter().map(name).collect();
     let mut text = String::new();
-    let names = names.join(" and ");
+    let names = listed(&names);
     let _ = match (names.as_str(), explanation.verdict) {
         ("", _) => writeln!(text, "{word}"),
         // Without a proof it is no name.

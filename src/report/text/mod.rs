@@ -103,3 +103,12 @@ mod tests {
         assert_eq!(count(2, "output"), "2 outputs");
     }
 }
+
+/// `a`, `a and b`, `a, b and c`.
+pub(crate) fn listed(of: &[String]) -> String {
+    match of {
+        [] => String::new(),
+        [only] => only.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}

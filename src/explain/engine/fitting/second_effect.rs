@@ -1,5 +1,6 @@
 //! What may be named beside an effect that was found.
 
+use crate::explain::engine::fitting::edit::Place;
 use crate::explain::engine::fitting::fitted::{Fitted, with_more};
 use crate::explain::engine::screening::screen::{Lead, Screen};
 use crate::explain::engine::terms::names::{called, family};
@@ -32,6 +33,26 @@ pub(in crate::explain::engine) fn differs(
         && is_later(id) == is_later(its_id);
     let is_new = family(id) != family(its_id) && !repeats;
     are_apart(id, its_id) || is_new && !matches!(id, "law" | "cross_coupling" | "viscous_friction")
+}
+
+/// Whether a term is the effect that was named first, in another equation and of other variables: the edge of a second tank, the friction
+/// of a second body.
+pub(in crate::explain::engine) fn repeats_elsewhere(
+    (term, id): (&Fitted, &str),
+    (first, its_id): (&Fitted, &str),
+) -> bool {
+    let in_equation = |f: &Fitted| matches!(f.lead.place, Place::Equation(_));
+    let has_name = !matches!(
+        id,
+        "law" | "cross_coupling" | "load_step" | "periodic_disturbance"
+    );
+    id == its_id
+        && has_name
+        && in_equation(term)
+        && in_equation(first)
+        && term.lead.place != first.lead.place
+        && !term.depends.is_empty()
+        && !term.depends.iter().any(|v| first.depends.contains(v))
 }
 
 /// Effects of one variable that act at opposite ends of it, and often together: the middle and the ends of an input, the friction and

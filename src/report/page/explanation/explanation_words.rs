@@ -1,6 +1,7 @@
 //! The words of the page: what effects and places are called, and the verdict in one sentence.
 
 use crate::explain::{EffectFound, Explanation, Verdict};
+pub(super) use crate::report::text::listed;
 
 /// What people call an effect: `coulomb_friction` is `Coulomb friction`.
 pub(super) fn effect_name(id: &str) -> String {
@@ -66,15 +67,6 @@ fn effect_at(effect: &EffectFound) -> String {
         name
     } else {
         format!("{name} at {}", effect.signal)
-    }
-}
-
-/// `a`, `a and b`, `a, b and c`.
-pub(super) fn listed(of: &[String]) -> String {
-    match of {
-        [] => String::new(),
-        [only] => only.clone(),
-        [most @ .., last] => format!("{} and {last}", most.join(", ")),
     }
 }
 
