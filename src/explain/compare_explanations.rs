@@ -2,7 +2,7 @@
 
 use super::explanation::{Explanation, SignalTraces, Verdict};
 use super::linear::answer::probability::UNLIKELY;
-use crate::noise::{Mask, effective_samples};
+use crate::noise::{Colours, Mask, Noise, effective_samples, kept, sum_of_squares};
 
 /// An effect beside a simulator that is neither linear nor reproduced by equations must take this part off the mean square of the
 /// error in blocks left out: more is explained than is not.
@@ -179,6 +179,29 @@ pub(crate) fn stands_in(equations: &Explanation, doubtful: &Explanation) -> bool
         false => (1.0 - MOST).sqrt(),
     };
     error_over(equations, doubtful).is_some_and(|error| error <= most)
+}
+
+/// Whether the run with what was found leaves more than 1 % of the variance of an output, and most of that can be predicted from what was
+/// left before: slow noise, or physics that was not found.
+pub(crate) fn leaves_slow_error(explanation: &Explanation) -> bool {
+    let most = (1.0 - FOLLOWS / 100.0).powi(2);
+    explanation.signals.iter().any(|trace| {
+        let errors = trace.recorded.iter().zip(&trace.augmented);
+        let errors: Vec<f64> = errors.map(|(y, s)| y - s).collect();
+        let mask: Mask = vec![errors.iter().map(|e| e.is_finite()).collect()];
+        let residual = vec![kept(&errors, &mask[0])];
+        let recorded = kept(&trace.recorded, &mask[0]);
+        let mask: Mask = vec![vec![true; recorded.len()]];
+        let noise = Noise::estimate(&residual, 1, &mask, Colours::Few);
+        let left = sum_of_squares(&residual[0]) / recorded.len().max(1) as f64;
+        left > most * variance(&recorded) && noise.absorbs(&residual, &mask)
+    })
+}
+
+fn variance(values: &[f64]) -> f64 {
+    let count = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count
 }
 
 /// Static laws inside a plant, which a plant of another class may have by its nature.

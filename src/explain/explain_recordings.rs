@@ -18,6 +18,7 @@ use super::linear::decision::output_error_decision::{Finding, inquire};
 use super::linear::fit::Fit;
 use super::linear::known::Known;
 use super::linear::known_simulation::{Simulator, check, know};
+use super::linear::model::linear_plant::Plant;
 use super::linear::nonlinear_simulator::NonlinearSimulator;
 use super::linear::screening::output_adequacy::LEVEL;
 use super::memory;
@@ -84,9 +85,9 @@ pub fn explain(
     };
     match simulator {
         Simulator::Linear(known) => {
-            let (explanation, absorbed) = explain_linear(*known, &checked, &allowed, options.seed)?;
-            let explanation = unless_refuted(explanation);
-            Ok(second_opinion(explanation, absorbed, &checked, options))
+            let mut answer = explain_linear(*known, &checked, &allowed, options.seed)?;
+            answer.explanation = unless_refuted(answer.explanation);
+            Ok(second_opinion(answer, &checked, options))
         }
         Simulator::Nonlinear(simulator) => {
             let explanation = explain_nonlinear(&simulator, &checked, &allowed, options)?;
@@ -105,13 +106,21 @@ fn no_fit(checked: &Checked) -> ExplainError {
     }
 }
 
-/// The answer relative to a linear plant, and whether noise may stand for physics in it.
+/// An answer relative to a linear plant.
+struct LinearAnswer {
+    explanation: Explanation,
+    /// The plant of the simulation.
+    given: Plant,
+    /// Whether noise may stand for physics in it.
+    absorbed: bool,
+}
+
 fn explain_linear(
     known: Known,
     checked: &Checked,
     allowed: &Allowed,
     seed: u64,
-) -> Result<(Explanation, bool), ExplainError> {
+) -> Result<LinearAnswer, ExplainError> {
     let drive = attempt(&checked.recordings, &known, allowed);
     // What a law in the averaged equation of a drive explains to noise needs no other way, and the rest little. Where no law
     // was found, the equation may be blind to what there is (effects of the sensor, another mode), and where a spring
@@ -140,7 +149,11 @@ fn explain_linear(
         (None, None) => return Err(no_fit(checked)),
     };
     let absorbed = adds_up(&known, &finding, &mask);
-    Ok((said(&known, checked, (finding, mask), seed), absorbed))
+    Ok(LinearAnswer {
+        explanation: said(&known, checked, (finding, mask), seed),
+        given: known.structure.coordinates.given.clone(),
+        absorbed,
+    })
 }
 
 /// Whether noise may stand for physics: a plant that integrates adds up what acts on it, and a noise model with a slow root takes that up.
@@ -154,12 +167,12 @@ fn adds_up(known: &Known, finding: &Finding, mask: &Mask) -> bool {
 
 /// An answer that is not sure is compared with that of the equations that reproduce the simulated outputs, and one that leaves
 /// structure with that of another plant.
-fn second_opinion(
-    explanation: Explanation,
-    absorbed: bool,
-    checked: &Checked,
-    options: &Options,
-) -> Explanation {
+fn second_opinion(answer: LinearAnswer, checked: &Checked, options: &Options) -> Explanation {
+    let LinearAnswer {
+        explanation,
+        given,
+        absorbed,
+    } = answer;
     let mut outputs = checked.recordings.iter().flat_map(|r| &r.outputs);
     let has_units = outputs.all(|o| o.unit.is_some());
     if !checked.troubles.is_empty() {
@@ -185,7 +198,7 @@ fn second_opinion(
     if !leaves_room(&explanation) {
         return explanation;
     }
-    let other = explain_structure(checked, &options.without, Some(&explanation));
+    let other = explain_structure(checked, &options.without, Some((&explanation, &given)));
     let other = other.filter(|other| supersedes(other, &explanation));
     other.unwrap_or(explanation)
 }

@@ -127,11 +127,21 @@ pub(crate) fn sentence(definition: &Definition, found: &EffectFound) -> String {
     text
 }
 
+/// A free run with a smaller fit, in percent, leaves more than half of the variance: 100 (1 - sqrt(1/2)).
+const HALF: f64 = 29.3;
+
 /// The lines that the terminal shows.
 pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
     let mut lines = Vec::new();
     let percent = |p: f64| format!("{:.0} %", 100.0 * p);
     match e.verdict {
+        Verdict::Consistent | Verdict::Parameters if e.fit.train.augmented.fit_percent < HALF => {
+            lines.push(format!(
+                "The recording does not refute the simulation, but its free run explains less than half of the variance of {}: it says \
+                 little of what may be missing.",
+                e.fit.output
+            ));
+        }
         Verdict::Consistent => lines.push(format!(
             "The recording agrees with the simulation: no difference beyond noise (probability {}).",
             percent(e.probability)
@@ -187,11 +197,18 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
         // What was found is other parameters when the verdict says so, and nothing when it says consistent.
         let steps = match e.verdict {
             Verdict::Consistent => f(heldout.simulation.fit_percent),
-            Verdict::Parameters => format!(
-                "simulation {}, other parameters {}",
-                f(heldout.simulation.fit_percent),
-                f(heldout.augmented.fit_percent)
-            ),
+            Verdict::Parameters => {
+                let (simulation, other) = (&heldout.simulation, &heldout.augmented);
+                let worse = match other.fit_percent < simulation.fit_percent {
+                    true => ", which are no better",
+                    false => "",
+                };
+                format!(
+                    "simulation {}, other parameters {}{worse}",
+                    f(simulation.fit_percent),
+                    f(other.fit_percent)
+                )
+            }
             Verdict::Named | Verdict::Family | Verdict::Unexplained => format!(
                 "simulation {}, other parameters {}, with this {}",
                 f(heldout.simulation.fit_percent),

@@ -21,6 +21,7 @@ use super::engine::terms::documentation::plant_effect;
 use super::engine::thresholds::NEEDED;
 use super::explanation::{EffectFound, Evidence, Explanation, ParameterChange, Quantity, Verdict};
 use super::linear::check::Checked;
+use super::linear::model::linear_plant::Plant as LinearPlant;
 use super::plant_answer::{
     Origin, PlantOptions, explain_equations, says_that_nothing_is_missing, spoken,
 };
@@ -33,6 +34,7 @@ const DETERMINED: f64 = 3.0;
 /// A plant in equations with one input and one output.
 struct Structure {
     equations: &'static str,
+    states: usize,
     /// The effect that a linear model of the plant leaves out; none where the equations are linear.
     lacks: Option<Lacks>,
 }
@@ -51,15 +53,18 @@ struct Lacks {
 const STRUCTURES: [Structure; 4] = [
     Structure {
         equations: include_str!("drive.mo"),
+        states: 2,
         lacks: None,
     },
     Structure {
         equations: include_str!("speed.mo"),
+        states: 1,
         lacks: None,
     },
     // A level is not negative.
     Structure {
         equations: include_str!("tanks.mo"),
+        states: 2,
         lacks: Some(Lacks {
             effect: "tank_outflow",
             equation: "der({output:_lower}) = upper_outflow*sqrt({output:_upper}) - lower_outflow*sqrt({output:_lower})",
@@ -69,6 +74,7 @@ const STRUCTURES: [Structure; 4] = [
     },
     Structure {
         equations: include_str!("tank.mo"),
+        states: 1,
         lacks: Some(Lacks {
             effect: "tank_outflow",
             equation: "der({output:_level}) = pump_gain*{input} + pump_offset - outflow*sqrt({output:_level})",
@@ -91,20 +97,23 @@ const BELOW_ZERO: f64 = 0.1;
 pub(crate) fn explain_structure(
     checked: &Checked,
     without: &[String],
-    linear: Option<&Explanation>,
+    linear: Option<(&Explanation, &LinearPlant)>,
 ) -> Option<Explanation> {
     let marks = Marks::of(&checked.recordings)?;
     let recordings: Vec<PlantRecording> = checked.recordings.iter().map(Into::into).collect();
     let level = is_level(&recordings);
-    let most = linear.map_or(f64::INFINITY, |l| {
+    let most = linear.map_or(f64::INFINITY, |(l, _)| {
         MOST_ERROR * l.fit.train.parameters_only.rmse
     });
     let most = most.min(HOPELESS * marks.output_std());
-    // Of a plant that is followed, only a curve may be another plant's.
-    let followed = linear.is_some_and(follows);
+    // Of a plant that is followed, only a curve may be another plant's. A linear structure of a higher order would take up what the
+    // simulation lacks without a name, and a plant that oscillates is no tank.
+    let followed = linear.is_some_and(|(answer, _)| follows(answer));
+    let order = linear.map_or(usize::MAX, |(_, plant)| plant.states);
+    let oscillates = linear.is_some_and(|(_, plant)| plant.oscillates());
     let offered = |s: &&Structure| match &s.lacks {
-        Some(lacks) => level && !without.iter().any(|id| id == lacks.effect),
-        None => !followed,
+        Some(lacks) => level && !oscillates && !without.iter().any(|id| id == lacks.effect),
+        None => !followed && s.states <= order,
     };
     let started = STRUCTURES.iter().filter(offered).filter_map(|s| {
         let started = started(s.equations, &marks, &recordings, Hold::Zero)?;
@@ -118,7 +127,7 @@ pub(crate) fn explain_structure(
             .min_by(|a, b| a.1.criterion.total_cmp(&b.1.criterion))
     };
     let both = [likeliest(linear_ones), likeliest(others)];
-    let linear_error = linear.map_or(marks.output_std(), |l| l.fit.train.augmented.rmse);
+    let linear_error = linear.map_or(marks.output_std(), |(l, _)| l.fit.train.augmented.rmse);
     let explained = both.into_iter().flatten().filter_map(|(s, started)| {
         let mut explanation = explain(&started, checked, without)?;
         if let Some(lacks) = &s.lacks {
@@ -137,7 +146,7 @@ pub(crate) fn explain_structure(
     })?;
     let given = linear.map_or_else(
         || "the simulation, which is unstable".to_owned(),
-        |l| {
+        |(l, _)| {
             format!(
                 "the linear simulation, with which {:.1} % is reached with other parameters",
                 l.fit.train.parameters_only.fit_percent

@@ -270,7 +270,7 @@ pub(crate) fn family(id: &str) -> &str {
 }
 
 /// The special case of a form that has a name too.
-pub(in crate::explain::engine) fn special_case(id: &str) -> Option<&'static str> {
+pub(in crate::explain) fn special_case(id: &str) -> Option<&'static str> {
     match id {
         "stribeck_friction" => Some("coulomb_friction"),
         "asymmetric_damping" | "extra_mode" => Some("viscous_friction"),

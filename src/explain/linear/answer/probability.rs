@@ -33,6 +33,7 @@
 //! A probability is that of such a mixture: where nine recordings of ten miss something, fewer of the answers "consistent"
 //! are right.
 
+use crate::explain::engine::terms::names::special_case;
 use crate::explain::explanation::{FitTable, Verdict};
 use crate::explain::linear::decision::output_error_decision::Finding;
 use crate::explain::linear::screening::output_adequacy::LEVEL;
@@ -85,7 +86,11 @@ fn named(finding: &Finding) -> f64 {
     let next = finding
         .rivals
         .iter()
-        .find(|r| effects.iter().all(|e| e.definition.id != r.definition.id))
+        .find(|r| {
+            // A more general form explains as much as its special case.
+            let alike = |id: &str| id == r.definition.id || special_case(r.definition.id) == Some(id);
+            !effects.iter().any(|e| alike(e.definition.id))
+        })
         .map_or(0.0, |r| r.gain.max(0.0));
     let lead = (finding.gain - next).max(LEAST_LEAD);
     let noise = finding.adequacy.map_or(1.0, |a| a.p_value).max(LEVEL);
