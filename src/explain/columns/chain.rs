@@ -11,6 +11,10 @@ use super::column::Column;
 use super::filtered_signals::{Part, Signal, Signals, written};
 use super::regression::OutputEquation;
 
+/// What is left of the coefficient of a state beside what it exchanges is zero below this part of that. Where it is not, the fit of the
+/// equations without it shows it.
+const ALL_EXCHANGED: f64 = 0.02;
+
 /// A coefficient below this part of the largest of its signal is rounding.
 const ROUNDING: f64 = 1e-12;
 
@@ -44,6 +48,23 @@ pub(super) struct Term {
 pub(super) struct Chains {
     pub(super) orders: Vec<usize>,
     pub(super) terms: Vec<Term>,
+}
+
+/// A strength that several equations share: of a function in each of them, or of what two outputs exchange.
+#[derive(Debug, Clone)]
+struct Shared {
+    /// The term whose coefficient is the strength, and those whose coefficients are in proportion to it.
+    first: usize,
+    others: Vec<usize>,
+    /// The states whose difference it is of; none for a function.
+    between: Option<[Of; 2]>,
+}
+
+/// Values of the coefficients where equations share strengths; what is zero is left out.
+#[derive(Debug, Clone)]
+pub(super) struct Sharing {
+    shared: Vec<Shared>,
+    pub(super) values: Vec<f64>,
 }
 
 /// Place of a coefficient of the derivative `power` of a signal in the equation of order `order`: 0 beside the output, `l + 1`
@@ -130,6 +151,72 @@ impl Chains {
             .then_some(Self { orders, terms })
     }
 
+    /// What the equations share: heat or a force between two outputs, which each of them has with the other's state; and functions that
+    /// enter several equations. With one strength for all of them, a change of it is one of one parameter. None where nothing is shared.
+    pub(super) fn sharing(&self, signals: &Signals) -> Option<Sharing> {
+        let mut values: Vec<f64> = self.terms.iter().map(|t| t.value).collect();
+        let mut shared = Vec::new();
+        let at = |row: Row, of: Of| self.terms.iter().position(|t| t.row == row && t.of == of);
+        let mut exchanged = vec![0.0; values.len()];
+        for (i, &order) in self.orders.iter().enumerate() {
+            for (j, &other) in self.orders.iter().enumerate().skip(i + 1) {
+                for k in 0..order.min(other) {
+                    let rows = [Row::State(i, order - 1), Row::State(j, other - 1)];
+                    let states = [Of::State(i, k), Of::State(j, k)];
+                    let (Some(first), Some(second)) =
+                        (at(rows[0], states[1]), at(rows[1], states[0]))
+                    else {
+                        continue;
+                    };
+                    let own = [at(rows[0], states[0]), at(rows[1], states[1])];
+                    let given = [values[first], values[second]];
+                    let both = own.into_iter().zip(given);
+                    let passes_on = |(own, given): (Option<usize>, f64)| {
+                        let most = (1.0 + ALL_EXCHANGED) * own.map_or(0.0, |o| -values[o]);
+                        given > 0.0 && given <= most
+                    };
+                    if !both.clone().all(passes_on) {
+                        continue;
+                    }
+                    for (own, given) in both {
+                        if let Some(own) = own {
+                            exchanged[own] += given;
+                        }
+                    }
+                    values[second] = -given[1] / given[0];
+                    shared.push(Shared {
+                        first,
+                        others: vec![second],
+                        between: Some([states[1], states[0]]),
+                    });
+                }
+            }
+        }
+        for (value, exchanged) in values.iter_mut().zip(&exchanged) {
+            *value += exchanged;
+            if value.abs() <= ALL_EXCHANGED * exchanged {
+                *value = 0.0;
+            }
+        }
+        for s in 0..signals.all.len() {
+            let mut terms = (0..self.terms.len()).filter(|&i| self.terms[i].of == Of::Signal(s));
+            let is_function = matches!(signals.all[s], Signal::Function(..));
+            let Some(first) = terms.next().filter(|_| is_function) else {
+                continue;
+            };
+            let others: Vec<usize> = terms.collect();
+            others.iter().for_each(|&i| values[i] /= values[first]);
+            if !others.is_empty() {
+                shared.push(Shared {
+                    first,
+                    others,
+                    between: None,
+                });
+            }
+        }
+        (!shared.is_empty()).then_some(Sharing { shared, values })
+    }
+
     /// Functions that enter several equations, such as a force between two bodies, are variables of their own, which something
     /// else may enter with them; with their names.
     fn common(
@@ -146,6 +233,19 @@ impl Chains {
         several.zip(names).collect()
     }
 
+    /// What outputs exchange, with its names.
+    fn exchanges<'a>(
+        &self,
+        sharing: Option<&'a Sharing>,
+        inputs: &[Column],
+        outputs: &[Column],
+    ) -> Vec<(&'a Shared, String)> {
+        let taken = |name: &String| inputs.iter().chain(outputs).any(|c| c.0.name == *name);
+        let names = (1..).map(|n| format!("exchange{n}")).filter(|n| !taken(n));
+        let all = sharing.into_iter().flat_map(|s| &s.shared);
+        all.filter(|s| s.between.is_some()).zip(names).collect()
+    }
+
     /// The same as a text, with a parameter for each coefficient.
     pub(crate) fn text(
         &self,
@@ -153,6 +253,7 @@ impl Chains {
         inputs: &[Column],
         outputs: &[Column],
         start: &[Vec<f64>],
+        sharing: Option<&Sharing>,
     ) -> String {
         let state = |j: usize, k: usize| outputs[j].state(k);
         let has = |row: Row| self.terms.iter().any(|t| t.row == row);
@@ -196,13 +297,32 @@ impl Chains {
                     },
                 }
             };
+        let exchanges = self.exchanges(sharing, inputs, outputs);
+        let value = |i: usize| sharing.map_or(self.terms[i].value, |s| s.values[i]);
+        let used = || (0..self.terms.len()).filter(|&i| value(i) != 0.0);
+        let is_strength = |i: usize| {
+            let mut shared = sharing.iter().flat_map(|s| &s.shared);
+            shared.any(|s| s.first == i)
+        };
+        let exchange = |i: usize| {
+            let mut all = exchanges.iter();
+            all.find(|(of, _)| of.first == i || of.others.contains(&i))
+                .map(|(_, name)| name.clone())
+        };
+        let written_term = |i: usize| match exchange(i).or_else(|| factor(&self.terms[i].of)) {
+            Some(factor) if is_strength(i) => factor,
+            Some(factor) => format!("c{}*{factor}", i + 1),
+            None => format!("c{}", i + 1),
+        };
         let sum = |row: Row| -> String {
-            let own = self.terms.iter().enumerate().filter(|(_, t)| t.row == row);
-            let each = own.map(|(i, t)| match factor(&t.of) {
-                Some(factor) => format!("c{}*{factor}", i + 1),
-                None => format!("c{}", i + 1),
-            });
-            each.collect::<Vec<_>>().join(" + ")
+            let own = used().filter(|&i| self.terms[i].row == row);
+            own.map(written_term).collect::<Vec<_>>().join(" + ")
+        };
+        let strength = |s: usize| {
+            let mut functions = sharing.iter().flat_map(|s| &s.shared);
+            let of = |i: usize| self.terms[i].of == Of::Signal(s);
+            let shared = functions.find(|f| f.between.is_none() && of(f.first));
+            shared.map_or_else(String::new, |f| format!("c{}*", f.first + 1))
         };
         let join = |first: Option<String>, rest: String| match (first, rest.is_empty()) {
             (Some(first), true) => first,
@@ -212,17 +332,20 @@ impl Chains {
         };
         let mut text =
             String::from("model Simulation \"equations that reproduce the simulated outputs\"\n");
-        for (i, term) in self.terms.iter().enumerate() {
-            let of = factor(&term.of).unwrap_or_else(|| "constant".to_owned());
-            let row = match term.row {
+        for i in used() {
+            let term = &self.terms[i];
+            let of = || factor(&term.of).unwrap_or_else(|| "constant".to_owned());
+            let row = || match term.row {
                 Row::Output(j) => outputs[j].name(),
                 Row::State(j, k) => format!("der({})", state(j, k)),
             };
-            text += &format!(
-                "  parameter Real c{} = {:e} \"of {of} in {row}\";\n",
-                i + 1,
-                term.value
-            );
+            let what = match (is_strength(i), exchange(i)) {
+                (true, Some(name)) => format!("strength of {name}"),
+                (true, None) => format!("strength of {}", of()),
+                (false, Some(name)) => format!("of {name} in {}", row()),
+                (false, None) => format!("of {} in {}", of(), row()),
+            };
+            text += &format!("  parameter Real c{} = {:e} \"{what}\";\n", i + 1, value(i));
         }
         for input in inputs {
             text += &format!("  input Real {}{};\n", input.name(), input.unit());
@@ -240,14 +363,24 @@ impl Chains {
         for name in all().flat_map(|j| slope(j).into_iter().chain(signal(j))) {
             text += &format!("  Real {name};\n");
         }
-        for (_, name) in &common {
+        let exchanged = exchanges.iter().map(|(_, name)| name);
+        for name in common.iter().map(|(_, name)| name).chain(exchanged) {
             text += &format!("  Real {name};\n");
         }
         text += "equation\n";
         for (s, name) in &common {
             if let Signal::Function(form, parts) = &signals.all[*s] {
                 let arguments: Vec<String> = parts.iter().map(argument).collect();
-                text += &format!("  {name} = {};\n", written(*form, &arguments));
+                let strength = strength(*s);
+                text += &format!("  {name} = {strength}{};\n", written(*form, &arguments));
+            }
+        }
+        for (shared, name) in &exchanges {
+            if let Some([more, less]) = shared.between {
+                let (more, less) = (factor(&more), factor(&less));
+                let (more, less) = (more.unwrap_or_default(), less.unwrap_or_default());
+                let strength = shared.first + 1;
+                text += &format!("  {name} = c{strength}*({more} - {less});\n");
             }
         }
         for (j, &order) in self.orders.iter().enumerate() {

@@ -24,14 +24,14 @@ pub(crate) use simulator_outputs::explain_sensors;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use self::chain::Chains;
+use self::chain::{Chains, Sharing};
 use self::drop_coefficients::eliminate;
 use self::filtered_signals::{Regressors, Signals};
 use self::regression::{OutputEquation, output_equation};
 use crate::log::Channel;
 use crate::noise::{Noise, Series};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
-use crate::physics::{Hold, Plant, parse};
+use crate::physics::{Hold, Plant, Point, parse};
 
 /// Most states, and most in the chain of one output.
 const MOST_STATES: usize = 5;
@@ -80,6 +80,12 @@ struct Fitted {
     misfit: f64,
 }
 
+/// Chains with the values of their coefficients and initial states.
+struct Valued {
+    chains: Chains,
+    start: Vec<Vec<f64>>,
+}
+
 struct Columns<'a> {
     recordings: &'a [PlantRecording],
     signals: Signals,
@@ -116,12 +122,15 @@ pub(crate) fn reproduce(simulated: &[PlantRecording], question: &Question) -> Op
     let options = columns.options(&found.plant);
     let study = Study::new(&found.plant, simulated, &options).ok()?;
     let remainder = study.residual(&found.fit)?;
-    let plant = columns.with_values(&found, &study)?;
-    Some(Reproduced {
-        plant,
-        hold: columns.hold,
-        remainder,
-        misfit: found.misfit,
+    let chains = columns.with_values(&found, &study)?;
+    let shared = columns.shared(&chains, found.misfit);
+    shared.or_else(|| {
+        Some(Reproduced {
+            plant: columns.plant(&chains, None)?,
+            hold: columns.hold,
+            remainder,
+            misfit: found.misfit,
+        })
     })
 }
 
@@ -185,7 +194,7 @@ impl Columns<'_> {
     /// Fits the coefficients in free run.
     fn fitted(&self, chains: Chains) -> Option<Fitted> {
         let start = self.signals.start(&chains.orders);
-        let text = chains.text(&self.signals, &self.inputs, &self.outputs, &start);
+        let text = chains.text(&self.signals, &self.inputs, &self.outputs, &start, None);
         let plant = Plant::new(parse(&text).ok()?).with_most_steps(MOST_STEPS);
         let options = self.options(&plant);
         let study = Study::new(&plant, self.recordings, &options).ok()?;
@@ -211,20 +220,61 @@ impl Columns<'_> {
         })
     }
 
-    /// The plant with what was fitted in its text; it starts as in the first recording.
-    fn with_values(&self, found: &Fitted, study: &Study) -> Option<Plant> {
+    /// The chains and the initial states with what was fitted.
+    fn with_values(&self, found: &Fitted, study: &Study) -> Option<Valued> {
         let point = study.points(&found.fit).into_iter().next()?;
         let mut chains = found.chains.clone();
         for (term, value) in chains.terms.iter_mut().zip(&point.parameters) {
             term.value = *value;
         }
+        let start = self.started(&chains, &point)?;
+        Some(Valued { chains, start })
+    }
+
+    /// The initial states of a point: as in the first recording.
+    fn started(&self, chains: &Chains, point: &Point) -> Option<Vec<Vec<f64>>> {
         let mut fitted = point.start.iter().map(|s| s.unwrap_or(0.0));
         let mut start = self.signals.start(&chains.orders);
         for state in start.iter_mut().flatten() {
             *state = fitted.next()?;
         }
-        let text = chains.text(&self.signals, &self.inputs, &self.outputs, &start);
+        Some(start)
+    }
+
+    fn plant(&self, valued: &Valued, sharing: Option<&Sharing>) -> Option<Plant> {
+        let Valued { chains, start } = valued;
+        let (inputs, outputs) = (&self.inputs, &self.outputs);
+        let text = chains.text(&self.signals, inputs, outputs, start, sharing);
         Some(Plant::new(parse(&text).ok()?))
+    }
+
+    /// The same with one strength for what equations share, if these reproduce the outputs as well then.
+    fn shared(&self, valued: &Valued, misfit: f64) -> Option<Reproduced> {
+        let mut sharing = valued.chains.sharing(&self.signals)?;
+        let plant = self.plant(valued, Some(&sharing))?;
+        let plant = plant.with_most_steps(MOST_STEPS);
+        let options = self.options(&plant);
+        let study = Study::new(&plant, self.recordings, &options).ok()?;
+        let fit = study.least_squares(&study.nominal())?;
+        let less = self.misfit(&study, &fit)?;
+        let point = study.points(&fit).into_iter().next()?;
+        let used = sharing.values.iter_mut().filter(|v| **v != 0.0);
+        for (value, fitted) in used.zip(&point.parameters) {
+            *value = *fitted;
+        }
+        let fitted = Valued {
+            chains: valued.chains.clone(),
+            start: self.started(&valued.chains, &point)?,
+        };
+        if less > misfit.max(REPRODUCED) {
+            return None;
+        }
+        Some(Reproduced {
+            plant: self.plant(&fitted, Some(&sharing))?,
+            hold: self.hold,
+            remainder: study.residual(&fit)?,
+            misfit: less,
+        })
     }
 
     fn misfit(&self, study: &Study, fit: &Fit) -> Option<f64> {

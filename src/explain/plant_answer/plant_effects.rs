@@ -11,7 +11,7 @@ use crate::explain::engine::fitting::edit::{Place, is_shared_term, user_of};
 use crate::explain::engine::fitting::fitted::Fitted;
 use crate::explain::engine::hypothesis::Hypothesis;
 use crate::explain::engine::screening::curve::Curve;
-use crate::explain::engine::terms::term::{Port, Shape, Starts};
+use crate::explain::engine::terms::term::{Port, Starts};
 use crate::explain::engine::terms::values::{about_usual, filled};
 use crate::explain::engine::thresholds::NEEDED;
 use crate::explain::explanation::{Alternative, EffectFound, Evidence, Law, Quantity};
@@ -54,13 +54,15 @@ impl Answer<'_> {
         let name = |v| before.variable(v).column().to_owned();
         let (at, enters) = (name(at), name(entered));
         let covariance = &self.within_bounds;
+        let is_offset = fitted.lead.sensor && fitted.lead.term.form == "1.0";
         let mut parameters = BTreeMap::new();
         for (i, (name, at)) in self.parameters_of(fitted).enumerate() {
             let std = covariance[(at, at)].max(0.0).sqrt();
             let shape = fitted.lead.term.shapes.get(i);
-            let unit = match shape.is_some_and(Shape::is_value) {
-                true => unit_of_argument(fitted, &self.plant.spec),
-                false => None,
+            let unit = match shape {
+                Some(shape) if shape.is_value() => unit_of_argument(fitted, &self.plant.spec),
+                None if is_offset => before.variable(entered).unit_text.clone(),
+                _ => None,
             };
             parameters.insert(
                 name.clone(),

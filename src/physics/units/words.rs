@@ -47,7 +47,12 @@ impl<'a> Words<'a> {
         // Differences in degC are those in K.
         let scaled = |text: &str| !symbols::is_coherent(&text.replace("degC", "K"));
         let mut scaled = texts.clone().filter(|(_, text)| scaled(text));
-        if scaled.next().is_none() || unit.is_one() {
+        // A pure number is one beside lengths in millimetres, and may be an angle beside degrees.
+        let is_coherent = match unit.is_one() {
+            true => scaled.all(|(u, _)| !u.is_one()),
+            false => scaled.next().is_none(),
+        };
+        if is_coherent {
             return Some(self.readable(unit));
         }
         let alike: HashSet<&str> = texts
@@ -56,7 +61,7 @@ impl<'a> Words<'a> {
             .collect();
         match alike.len() {
             0 if unit.same(&Unit::SECOND) => Some("s".to_owned()),
-            1 => alike.into_iter().next().map(str::to_owned),
+            1 if !unit.is_one() => alike.into_iter().next().map(str::to_owned),
             _ => None,
         }
     }

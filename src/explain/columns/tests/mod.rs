@@ -142,6 +142,42 @@ fn of_equivalent_orders_those_with_the_fewest_terms_are_taken() {
     assert!(text.contains("ic = ic_state"), "{text}");
 }
 
+/// Two rooms with a wall between them: what passes through it is one flow with one strength.
+#[test]
+fn what_two_outputs_exchange_has_one_strength() {
+    let rooms = "model Rooms input Real u; output Real a; output Real b; Real x(start=1); Real z(start=0.5);
+equation
+  der(x) = 0.5*u - 0.2*u*x - 0.3*(x - z); der(z) = 0.2*(x - z) - 0.1*z; a = x; b = z; end Rooms;";
+    let u: Vec<f64> = steps(20).iter().map(|u| 1.2 + 0.8 * u).collect();
+    let found = found(rooms, &["a", "b"], &u, 0.2);
+    let text = &found.plant.spec.text;
+    assert!(found.misfit < REPRODUCED, "{}: {text}", found.misfit);
+    let value = |name: &str| -> f64 {
+        let of = format!("parameter Real {name} = ");
+        let value = text.split(&of).nth(1).and_then(|t| t.split(' ').next());
+        value.and_then(|v| v.parse().ok()).unwrap_or(f64::NAN)
+    };
+    let equation = |left: &str| {
+        let lines = text.lines().map(str::trim);
+        lines
+            .clone()
+            .find_map(|l| l.strip_prefix(left))
+            .unwrap_or("")
+    };
+    let exchange = equation("exchange1 = ");
+    let strength = value(exchange.split('*').next().unwrap());
+    assert!((strength - 0.3).abs() < 1e-3, "{text}");
+    // Nothing of the first room is beside it; the second loses heat to the outside.
+    assert!(exchange.ends_with("*(b_state - a_state)"), "{text}");
+    let first = equation("der(a_state) = ");
+    assert!(first.contains("exchange1 + "), "{text}");
+    assert_eq!(first.matches("a_state").count(), 1, "{text}");
+    let second = equation("der(b_state) = ");
+    let ratio = second.split("*exchange1").next().unwrap();
+    let ratio = value(ratio.rsplit(' ').next().unwrap());
+    assert!((ratio + 2.0 / 3.0).abs() < 3e-3, "{text}");
+}
+
 fn log(u: &[f64], outputs: Vec<Vec<f64>>, sample_time: f64) -> Log {
     Log {
         name: "log".to_owned(),

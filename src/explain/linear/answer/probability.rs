@@ -88,7 +88,8 @@ fn named(finding: &Finding) -> f64 {
         .iter()
         .find(|r| {
             // A more general form explains as much as its special case.
-            let alike = |id: &str| id == r.definition.id || special_case(r.definition.id) == Some(id);
+            let alike =
+                |id: &str| id == r.definition.id || special_case(r.definition.id) == Some(id);
             !effects.iter().any(|e| alike(e.definition.id))
         })
         .map_or(0.0, |r| r.gain.max(0.0));
