@@ -161,7 +161,7 @@ equation
         let lines = text.lines().map(str::trim);
         lines
             .clone()
-            .find_map(|l| l.strip_prefix(left))
+            .find_map(|l| l.trim_end_matches(';').strip_prefix(left))
             .unwrap_or("")
     };
     let exchange = equation("exchange1 = ");

@@ -221,8 +221,9 @@ fn moved(spec: &ModelSpec, fit: &Fit) -> f64 {
     costs.filter(|c| c.is_finite()).sum()
 }
 
-/// Puts fits in the order in which they are given as answers, from one by their gains.
-pub(in crate::explain::engine) fn order(spec: &ModelSpec, fitted: &mut [Fitted]) {
+/// Puts fits in the order in which they are given as answers, from one by their gains. A name that does not gain what is needed stands in
+/// the place of nothing that does.
+pub(in crate::explain::engine) fn order(spec: &ModelSpec, fitted: &mut [Fitted], needed: f64) {
     // Among those that explain the recording as well as the best, the one with a name of its own comes first. Of several such
     // the best, unless their gains are equal.
     let free = spec.inputs().is_empty();
@@ -241,7 +242,8 @@ pub(in crate::explain::engine) fn order(spec: &ModelSpec, fitted: &mut [Fitted])
         // Where nothing drives the plant, a lag of its sensor and a store beside it are the same but for a number: they fit alike.
         let deviance = first.fit.deviance;
         let alike = |f: &Fitted| free && f.fit.deviance <= deviance + ALIKE;
-        let tied = |f: &Fitted| best - f.gain <= tie || alike(f);
+        let proven = |f: &Fitted| best <= needed || f.gain > needed;
+        let tied = |f: &Fitted| best - f.gain <= tie && proven(f) || alike(f);
         fitted.sort_by_key(|f| !tied(f));
         let ties = fitted.iter().take_while(|f| tied(f)).count();
         fitted[..ties].sort_by_key(|f| name_rank(spec, f));

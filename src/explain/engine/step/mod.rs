@@ -118,7 +118,7 @@ pub(super) fn step(stage: &Stage) -> Step {
         fitted = add_neighbours(fitted, arguments, (stage, &ground));
     }
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    order(&plant.spec, &mut fitted);
+    order(&plant.spec, &mut fitted, stage.needed);
     Step {
         fitted,
         strongest: origins.strongest,
