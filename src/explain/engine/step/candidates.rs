@@ -25,6 +25,18 @@ use crate::physics::estimate::{Fit, Form, Study};
 const NAMED_THERE: usize = 6;
 const NAMED_OF_A_FORM: usize = 2;
 
+/// Limits of what integrates that are fitted thoroughly: one of each kind.
+const LIMITS: usize = 3;
+
+/// The fit as a free run, with so many of its numbers.
+fn free_run(fit: &Fit, numbers: usize) -> Fit {
+    Fit {
+        form: Form::FreeRun,
+        point: fit.point[..numbers].to_vec(),
+        ..fit.clone()
+    }
+}
+
 /// A lead that was fitted with the noise of the fit before, and what that gains.
 #[derive(Clone)]
 struct Glanced {
@@ -98,15 +110,30 @@ impl Candidates<'_> {
         let starts: Vec<(&Lead, (&Fit, bool))> = (leads.iter())
             .flat_map(|lead| from.clone().map(move |from| (lead, from)))
             .collect();
-        let each = starts
+        let begun = starts
             .into_par_iter()
-            .filter_map(|(lead, (from, observed))| self.limit(lead, at, from, observed));
+            .filter_map(|(lead, (from, observed))| {
+                let (begun, deviance) = self.begin_limit(lead, at, from)?;
+                // A free run that strays says little of which limit it is.
+                let order = if observed {
+                    f64::NEG_INFINITY
+                } else {
+                    deviance
+                };
+                Some((order, begun, observed))
+            });
+        let mut begun: Vec<(f64, Glanced, bool)> = begun.collect();
+        begun.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let observed = begun.iter().filter(|b| b.2).count();
+        begun.truncate(observed + LIMITS);
+        let each = begun
+            .into_par_iter()
+            .filter_map(|(_, begun, observed)| self.limit(begun, observed));
         each.flatten_iter().collect()
     }
 
-    /// Fits of a limit in free run, and with an observer where a free run strays: where something else bends the rate too, it reaches the
-    /// ends at other times than the recording.
-    fn limit(&self, lead: &Lead, origin: usize, from: &Fit, observed: bool) -> Option<Vec<Fitted>> {
+    /// A limit after a few steps of its fit in free run, and the deviance of that with white noise.
+    fn begin_limit(&self, lead: &Lead, origin: usize, from: &Fit) -> Option<(Glanced, f64)> {
         let Stage {
             plant,
             study,
@@ -118,14 +145,28 @@ impl Candidates<'_> {
         let options = with_more(self.stage.options, made.values.len());
         let rough = made.rough(study, MOST_STEPS);
         let inner = study.of(&rough, &options).ok()?;
-        let numbers = study.nominal().len();
-        let free_run = |from: &Fit, numbers: usize| Fit {
-            form: Form::FreeRun,
-            point: from.point[..numbers].to_vec(),
-            ..from.clone()
-        };
-        let start = made.from(&free_run(from, numbers), study.parameters());
+        let start = made.from(&free_run(from, study.nominal().len()), study.parameters());
         let start = inner.gaussian(&start)?;
+        let fit = inner.refit(&start, 0, GLANCE)?;
+        let deviance = inner.gaussian(&fit)?.deviance;
+        let glanced = Glanced {
+            gain: 0.0,
+            lead: lead.clone(),
+            origin,
+            candidate: made,
+            fit: start,
+        };
+        Some((glanced, deviance))
+    }
+
+    /// Fits of a limit in free run, and with an observer where a free run strays: where something else bends the rate too, it reaches the
+    /// ends at other times than the recording.
+    fn limit(&self, begun: Glanced, observed: bool) -> Option<Vec<Fitted>> {
+        let study = self.stage.study;
+        let options = with_more(self.stage.options, begun.candidate.values.len());
+        let rough = begun.candidate.rough(study, MOST_STEPS);
+        let inner = study.of(&rough, &options).ok()?;
+        let start = begun.fit.clone();
         let observed = observed
             .then(|| inner.along_recording(&start))
             .flatten()
@@ -140,11 +181,8 @@ impl Candidates<'_> {
         let fits = best.into_iter().chain(observed);
         let fitted = fits.filter_map(|fit| {
             self.fit(Glanced {
-                gain: 0.0,
-                lead: lead.clone(),
-                origin,
-                candidate: made.clone(),
                 fit,
+                ..begun.clone()
             })
         });
         Some(fitted.collect())
