@@ -414,7 +414,12 @@ impl Answer<'_> {
     /// parameters, and one whose covariance is not known.
     fn is_significant(&self, fitted: &Fitted) -> bool {
         let shapes = fitted.lead.term.shapes;
-        let place = |i: usize| shapes.get(i).is_some_and(Shape::is_place);
+        // Where a share of something is coupled to the rest, it is that share which is told from 0, not the time that the coupling takes.
+        let share = shapes.iter().any(Shape::is_share);
+        let place = |i: usize| {
+            let shape = shapes.get(i);
+            shape.is_some_and(|s| s.is_place() || share && s.is_duration())
+        };
         let parameters = self.parameters_of(fitted).enumerate();
         let places: Vec<usize> = parameters
             .filter(|(i, _)| !place(*i))

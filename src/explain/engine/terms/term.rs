@@ -141,6 +141,11 @@ impl Shape {
         matches!(self.starts, Starts::Quantiles(_) | Starts::SizeQuantiles(_))
     }
 
+    /// Whether it is a part of what the equation's coefficient holds.
+    pub(crate) fn is_share(&self) -> bool {
+        matches!(self.starts, Starts::Share(_))
+    }
+
     /// Whether it is a time that something takes.
     pub(crate) fn is_duration(&self) -> bool {
         matches!(self.starts, Starts::Samples(_) | Starts::Length(_))
