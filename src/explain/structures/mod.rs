@@ -25,6 +25,7 @@ use super::linear::model::linear_plant::Plant as LinearPlant;
 use super::plant_answer::{
     Origin, PlantOptions, explain_equations, says_that_nothing_is_missing, spoken,
 };
+use super::simulation::Simulation;
 use crate::physics::Hold;
 use crate::physics::estimate::PlantRecording;
 
@@ -107,10 +108,14 @@ pub(crate) fn explain_structure(
     });
     let most = most.min(HOPELESS * marks.output_std());
     // Of a plant that is followed, only a curve may be another plant's. A linear structure of a higher order would take up what the
-    // simulation lacks without a name, and a plant that oscillates is no tank.
+    // simulation lacks without a name, and a plant that oscillates is no tank; of two tanks a pair of poles may be identified that
+    // turns, but has no peak.
     let followed = linear.is_some_and(|(answer, _)| follows(answer));
     let order = linear.map_or(usize::MAX, |(_, plant)| plant.states);
-    let oscillates = linear.is_some_and(|(_, plant)| plant.oscillates());
+    let oscillates = linear.is_some_and(|(_, plant)| match checked.simulation {
+        Simulation::Model(..) => plant.resonates(),
+        Simulation::Outputs(_) => plant.oscillates(),
+    });
     let offered = |s: &&Structure| match &s.lacks {
         Some(lacks) => level && !oscillates && !without.iter().any(|id| id == lacks.effect),
         None => !followed && s.states <= order,

@@ -1,6 +1,6 @@
 //! The linear part: a discrete state-space plant in plain arrays, quick to build and to run.
 
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 
 use crate::model::StateSpace;
 
@@ -23,15 +23,26 @@ impl Plant {
     /// friction. A negative real pole of a sampled plant does not count.
     pub(crate) fn oscillates(&self) -> bool {
         const TURNS: f64 = 0.1;
+        self.slowest_pole()
+            .is_some_and(|pole| pole.im.abs() > TURNS * pole.re.abs())
+    }
+
+    /// Whether the slowest pole has a damping ratio below 1/sqrt(2): the frequency response has a peak.
+    pub(crate) fn resonates(&self) -> bool {
+        self.slowest_pole()
+            .is_some_and(|pole| pole.im.abs() > pole.re.abs())
+    }
+
+    /// In continuous time, by its distance from 0.
+    fn slowest_pole(&self) -> Option<Complex<f64>> {
         if self.states == 0 {
-            return false;
+            return None;
         }
         let poles = self.a_matrix().complex_eigenvalues();
         let continuous = (poles.iter())
             .filter(|pole| pole.im != 0.0 || pole.re > 0.0)
             .map(|pole| pole.ln());
-        let slowest = continuous.min_by(|a, b| a.norm().total_cmp(&b.norm()));
-        slowest.is_some_and(|pole| pole.im.abs() > TURNS * pole.re.abs())
+        continuous.min_by(|a, b| a.norm().total_cmp(&b.norm()))
     }
 
     /// Whether a pole has a time constant longer than three recordings of so many samples: what disturbs the plant adds up.
