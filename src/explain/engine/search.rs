@@ -434,7 +434,7 @@ pub(super) fn forward(
                 let is_another = || {
                     differs(id, f.lead.term.port, &f.depends, first)
                         || f.gain > needed
-                            && repeats_elsewhere((f, id), first)
+                            && repeats_elsewhere(id, f.lead.place, &f.depends, first)
                             && explains_beside(f)
                 };
                 f.hypothesis.is_some() || is_another() && determined(&study, f, &options)

@@ -38,21 +38,23 @@ pub(in crate::explain::engine) fn differs(
 /// Whether a term is the effect that was named first, in another equation and of other variables: the edge of a second tank, the friction
 /// of a second body.
 pub(in crate::explain::engine) fn repeats_elsewhere(
-    (term, id): (&Fitted, &str),
+    id: &str,
+    place: Place,
+    depends: &[String],
     (first, its_id): (&Fitted, &str),
 ) -> bool {
-    let in_equation = |f: &Fitted| matches!(f.lead.place, Place::Equation(_));
+    let in_equation = |place: Place| matches!(place, Place::Equation(_));
     let has_name = !matches!(
         id,
         "law" | "cross_coupling" | "load_step" | "periodic_disturbance"
     );
     id == its_id
         && has_name
-        && in_equation(term)
-        && in_equation(first)
-        && term.lead.place != first.lead.place
-        && !term.depends.is_empty()
-        && !term.depends.iter().any(|v| first.depends.contains(v))
+        && in_equation(place)
+        && in_equation(first.lead.place)
+        && place != first.lead.place
+        && !depends.is_empty()
+        && !depends.iter().any(|v| first.depends.contains(v))
 }
 
 /// Effects of one variable that act at opposite ends of it, and often together: the middle and the ends of an input, the friction and
@@ -107,7 +109,9 @@ pub(in crate::explain::engine) fn drop_alike(
         let variables = lead.argument.map_or(&[][..], |a| &arguments[a].variables);
         let id = called(spec, lead.term, lead.place, variables);
         let depends = spec.names(variables);
-        if differs(id, lead.term.port, &depends, first) {
+        if differs(id, lead.term.port, &depends, first)
+            || repeats_elsewhere(id, lead.place, &depends, first)
+        {
             return true;
         }
         !std::mem::replace(&mut taken[usize::from(lead.curve.is_some())], true)
