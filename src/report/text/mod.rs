@@ -81,6 +81,15 @@ pub(crate) fn count(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 
+/// `a`, `a and b`, `a, b and c`.
+pub(crate) fn listed(of: &[String]) -> String {
+    match of {
+        [] => String::new(),
+        [only] => only.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -101,14 +110,5 @@ mod tests {
     fn one_is_singular() {
         assert_eq!(count(1, "input"), "1 input");
         assert_eq!(count(2, "output"), "2 outputs");
-    }
-}
-
-/// `a`, `a and b`, `a, b and c`.
-pub(crate) fn listed(of: &[String]) -> String {
-    match of {
-        [] => String::new(),
-        [only] => only.clone(),
-        [most @ .., last] => format!("{} and {last}", most.join(", ")),
     }
 }
