@@ -156,9 +156,7 @@ fn error_over(one: &Explanation, other: &Explanation) -> Option<f64> {
             sum / f64::from(count.max(1))
         };
         let traces = e.signals.iter();
-        traces
-            .map(|t| mean(&mut t.recorded.iter().zip(&t.augmented).map(|(y, s)| y - s)))
-            .collect()
+        traces.map(|t| mean(&mut errors(t).into_iter())).collect()
     };
     let (ours, theirs) = (squares(one), squares(other));
     if ours.is_empty() || ours.len() != theirs.len() {
@@ -186,8 +184,7 @@ pub(crate) fn stands_in(equations: &Explanation, doubtful: &Explanation) -> bool
 pub(crate) fn leaves_slow_error(explanation: &Explanation) -> bool {
     let most = (1.0 - FOLLOWS / 100.0).powi(2);
     explanation.signals.iter().any(|trace| {
-        let errors = trace.recorded.iter().zip(&trace.augmented);
-        let errors: Vec<f64> = errors.map(|(y, s)| y - s).collect();
+        let errors = errors(trace);
         let mask: Mask = vec![errors.iter().map(|e| e.is_finite()).collect()];
         let residual = vec![kept(&errors, &mask[0])];
         let recorded = kept(&trace.recorded, &mask[0]);
@@ -246,13 +243,14 @@ pub(crate) fn leaves_room(linear: &Explanation) -> bool {
     }
 }
 
+fn errors(trace: &SignalTraces) -> Vec<f64> {
+    let pairs = trace.recorded.iter().zip(&trace.augmented);
+    pairs.map(|(recorded, run)| recorded - run).collect()
+}
+
 /// Decrease of Schwarz's criterion of an explanation against a run with so many times its error and so many parameters less, under
 /// white noise of as many values as are independent.
 pub(crate) fn criterion_gain(explanation: &Explanation, times: f64, parameters: usize) -> f64 {
-    let errors = |t: &SignalTraces| -> Vec<f64> {
-        let pairs = t.recorded.iter().zip(&t.augmented);
-        pairs.map(|(y, s)| y - s).collect()
-    };
     let residual: Vec<Vec<f64>> = explanation.signals.iter().map(errors).collect();
     let mask: Mask = residual.iter().map(|e| vec![true; e.len()]).collect();
     let count = effective_samples(&residual, &mask).max(1.0);

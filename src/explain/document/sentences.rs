@@ -127,15 +127,12 @@ pub(crate) fn sentence(definition: &Definition, found: &EffectFound) -> String {
     text
 }
 
-/// A free run with a smaller fit, in percent, leaves more than half of the variance: 100 (1 - sqrt(1/2)).
-const HALF: f64 = 29.3;
-
 /// The lines that the terminal shows.
 pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
     let mut lines = Vec::new();
     let percent = |p: f64| format!("{:.0} %", 100.0 * p);
     match e.verdict {
-        Verdict::Consistent | Verdict::Parameters if e.fit.train.augmented.fit_percent < HALF => {
+        Verdict::Consistent | Verdict::Parameters if e.fit.train.augmented.leaves_half() => {
             lines.push(format!(
                 "The recording does not refute the simulation, but its free run explains less than half of the variance of {}: it says \
                  little of what may be missing.",

@@ -442,10 +442,11 @@ pub(super) fn forward(
         };
         // What may not be named beside the first, but gains more, may stand in its place.
         let instead = |f: &&Fitted| may_drop && first.is_some_and(|first| f.gain > first.gain);
-        let best = fitted.first().filter(|f| new(f) || instead(f));
+        let beside = fitted.first().is_some_and(|f| new(&f));
+        let best = fitted.first().filter(|f| beside || instead(f));
         // Of a second effect that is small beside a large first one, blocks left out say whether it is what the formula of the first
         // leaves.
-        let shows = |f: &Fitted| count > 0 && f.gain > SECOND.0 && new(&f) && explains_beside(f);
+        let shows = |f: &Fitted| count > 0 && f.gain > SECOND.0 && beside && explains_beside(f);
         let accepted = best
             .filter(|f| (f.gain > needed || f.explains || shows(f)) && count < MOST)
             .cloned();
@@ -463,7 +464,6 @@ pub(super) fn forward(
             }
             break;
         };
-        let beside = new(&&best);
         if may_drop
             && let Some(first) = first
             && let Some(alone) = without_first(

@@ -12,6 +12,18 @@ pub struct FitFigure {
     pub fit_percent: f64,
 }
 
+impl FitFigure {
+    /// What the run leaves of the variance, as a part of it.
+    pub(crate) fn left(&self) -> f64 {
+        (1.0 - 0.01 * self.fit_percent).powi(2)
+    }
+
+    /// Whether that is half of it or more.
+    pub(crate) fn leaves_half(&self) -> bool {
+        self.left() >= 0.5
+    }
+}
+
 /// Fit figures step by step, of the output that the effect shows most.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FitSteps {

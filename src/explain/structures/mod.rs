@@ -35,9 +35,14 @@ const DETERMINED: f64 = 3.0;
 /// A plant in equations with one input and one output.
 struct Structure {
     equations: &'static str,
-    states: usize,
     /// The effect that a linear model of the plant leaves out; none where the equations are linear.
     lacks: Option<Lacks>,
+}
+
+impl Structure {
+    fn states(&self) -> usize {
+        self.equations.matches("der(").count()
+    }
 }
 
 /// What equations have that no linear model has.
@@ -54,18 +59,15 @@ struct Lacks {
 const STRUCTURES: [Structure; 4] = [
     Structure {
         equations: include_str!("drive.mo"),
-        states: 2,
         lacks: None,
     },
     Structure {
         equations: include_str!("speed.mo"),
-        states: 1,
         lacks: None,
     },
     // A level is not negative.
     Structure {
         equations: include_str!("tanks.mo"),
-        states: 2,
         lacks: Some(Lacks {
             effect: "tank_outflow",
             equation: "der({output:_lower}) = upper_outflow*sqrt({output:_upper}) - lower_outflow*sqrt({output:_lower})",
@@ -75,7 +77,6 @@ const STRUCTURES: [Structure; 4] = [
     },
     Structure {
         equations: include_str!("tank.mo"),
-        states: 1,
         lacks: Some(Lacks {
             effect: "tank_outflow",
             equation: "der({output:_level}) = pump_gain*{input} + pump_offset - outflow*sqrt({output:_level})",
@@ -118,7 +119,7 @@ pub(crate) fn explain_structure(
     });
     let offered = |s: &&Structure| match &s.lacks {
         Some(lacks) => level && !oscillates && !without.iter().any(|id| id == lacks.effect),
-        None => !followed && s.states <= order,
+        None => !followed && s.states() <= order,
     };
     let started = STRUCTURES.iter().filter(offered).filter_map(|s| {
         let started = started(s.equations, &marks, &recordings, Hold::Zero)?;

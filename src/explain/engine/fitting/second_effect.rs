@@ -32,7 +32,12 @@ pub(in crate::explain::engine) fn differs(
         && kind(port) == kind(first.lead.term.port)
         && is_later(id) == is_later(its_id);
     let is_new = family(id) != family(its_id) && !repeats;
-    are_apart(id, its_id) || is_new && !matches!(id, "law" | "cross_coupling" | "viscous_friction")
+    are_apart(id, its_id) || is_new && has_own_name(id)
+}
+
+/// Whether a term is more than a function without a name, or another value of what a linear plant has.
+fn has_own_name(id: &str) -> bool {
+    !matches!(id, "law" | "cross_coupling" | "viscous_friction")
 }
 
 /// Whether a term is the effect that was named first, in another equation and of other variables: the edge of a second tank, the friction
@@ -44,12 +49,8 @@ pub(in crate::explain::engine) fn repeats_elsewhere(
     (first, its_id): (&Fitted, &str),
 ) -> bool {
     let in_equation = |place: Place| matches!(place, Place::Equation(_));
-    let has_name = !matches!(
-        id,
-        "law" | "cross_coupling" | "load_step" | "periodic_disturbance"
-    );
     id == its_id
-        && has_name
+        && has_own_name(id)
         && in_equation(place)
         && in_equation(first.lead.place)
         && place != first.lead.place

@@ -1,6 +1,6 @@
 //! Whether a free run without an effect is too poor for "nothing is missing" to be said of it.
 
-use crate::explain::engine::holdout::{SATISFACTORY, as_given, free_run_error};
+use crate::explain::engine::holdout::{as_given, free_run_error};
 use crate::explain::engine::misled::growth;
 use crate::explain::explanation::OutputFit;
 use crate::physics::Plant;
@@ -26,12 +26,12 @@ pub(in crate::explain::plant_answer) enum Astray {
 
 /// What the free run without an effect leaves of the variance of an output.
 fn left(output: &OutputFit) -> f64 {
-    (1.0 - 0.01 * output.train.parameters_only.fit_percent).powi(2)
+    output.train.parameters_only.left()
 }
 
 /// Whether that is half of it or more.
 pub(in crate::explain::plant_answer) fn leaves_half(output: &OutputFit) -> bool {
-    left(output) >= 1.0 - SATISFACTORY
+    output.train.parameters_only.leaves_half()
 }
 
 /// Whether the free run is too poor. Of an unstable plant that its inputs hold a free run says nothing.
