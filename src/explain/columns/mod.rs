@@ -10,11 +10,13 @@
 //! What a sensor does to the outputs needs no equations of what is before it ([`simulator_outputs`]).
 
 mod chain;
+mod chain_text;
 mod column;
 mod columns_answer;
 mod drop_coefficients;
 mod filtered_signals;
 mod regression;
+mod sharing;
 mod simulator_outputs;
 
 pub(crate) use column::Column;
@@ -24,10 +26,11 @@ pub(crate) use simulator_outputs::explain_sensors;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use self::chain::{Chains, Sharing};
+use self::chain::Chains;
 use self::drop_coefficients::eliminate;
 use self::filtered_signals::{Regressors, Signals};
 use self::regression::{OutputEquation, output_equation};
+use self::sharing::Sharing;
 use crate::log::Channel;
 use crate::noise::{Noise, Series};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};

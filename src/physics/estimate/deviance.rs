@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Form;
 use super::optimise::{Objective, RIDGE};
-use super::problem::Columns;
+use super::plant_recording::Columns;
 use super::problem::Problem;
 use crate::noise::{Colour, Noise, Series};
 use crate::physics::simulated::Run;

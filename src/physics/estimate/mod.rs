@@ -13,6 +13,7 @@ mod evaluate;
 mod free_run;
 mod observer;
 mod optimise;
+mod plant_recording;
 mod problem;
 mod profile;
 mod study;
@@ -20,8 +21,9 @@ mod study;
 pub use adequacy::{Question, ResidualTest};
 pub use determined::Undetermined;
 pub use evaluate::{Evaluation, Held, HeldNoise, evaluate, start_by_least_squares};
+pub use plant_recording::PlantRecording;
+pub use problem::EstimateError;
 pub(crate) use problem::VALUES_A_NUMBER;
-pub use problem::{EstimateError, PlantRecording};
 pub(crate) use study::Study;
 
 use nalgebra::DMatrix;
