@@ -184,6 +184,8 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
             "load_step"
         }
         _ if feeds(spec, id, found) => "law",
+        // What an actuator does for having moved comes late: an input that is ahead of itself is no hysteresis.
+        _ if term.id == "input_hysteresis" && found.strength() > 0.0 => "law",
         ("hysteresis", Some(&slip))
             if may_be_velocity(spec, &variables) && slip < YIELDS * found.travel =>
         {
