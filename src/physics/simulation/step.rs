@@ -26,6 +26,9 @@ const DIFFERENCE: [f64; 5] = [-3.0 / 16.0, -27.0 / 32.0, 25.0 / 32.0, 0.0, 0.25]
 const ITERATIONS: usize = 12;
 /// A stage is solved to this part of the error that a step may have.
 const STAGE_ACCURACY: f64 = 0.02;
+/// Factors of an earlier iteration are kept while each iteration leaves at most this part of the error: one more evaluation
+/// costs less than a Jacobian and its factors where they are good enough (Hairer and Wanner, section IV.8).
+const CONTRACTION: f64 = 0.25;
 
 /// To what the stages of an implicit step are solved.
 pub(super) struct Accuracy<'a> {
@@ -40,7 +43,7 @@ pub(super) struct Stages<const M: usize> {
     slopes: [Vec<Dual<M>>; 5],
     point: Vec<Dual<M>>,
     base: Vec<Dual<M>>,
-    newton: Newton,
+    newton: Newton<M>,
 }
 
 impl<const M: usize> Stages<M> {
@@ -182,7 +185,10 @@ impl<const M: usize> Stages<M> {
                 }
                 self.point[i] = point;
             }
-            field.evaluate(&at, &self.point, &mut self.slopes[stage]);
+            // Without slopes the stage itself says what its derivatives are.
+            if M > 0 || step <= 0.0 {
+                field.evaluate(&at, &self.point, &mut self.slopes[stage]);
+            }
             if M > 0 {
                 // k = f(base + step k): (I - step J) dk = J dbase + df
                 for lane in 0..M {
@@ -209,7 +215,7 @@ impl<const M: usize> Stages<M> {
 }
 
 /// Newton's iteration for `z = base + step f(z)`.
-struct Newton {
+struct Newton<const M: usize> {
     base: Vec<f64>,
     z: Vec<f64>,
     derivative: Vec<f64>,
@@ -218,9 +224,13 @@ struct Newton {
     right: Vec<f64>,
     /// Of `I - step J`.
     factors: Factors,
+    /// The step of the factors, where they may be used again.
+    factored: Option<f64>,
+    point: Vec<Dual<M>>,
+    slope: Vec<Dual<M>>,
 }
 
-impl Newton {
+impl<const M: usize> Newton<M> {
     fn new(n: usize) -> Self {
         let room = || vec![0.0; n];
         Self {
@@ -231,11 +241,41 @@ impl Newton {
             taken: room(),
             right: room(),
             factors: Factors::default(),
+            factored: None,
+            point: vec![Dual::constant(0.0); n],
+            slope: vec![Dual::constant(0.0); n],
         }
     }
 
-    /// Solves from the guess in `z`. False when it does not converge to `accuracy`.
-    fn solve<const M: usize>(
+    /// The largest of `values`, as a part of the error that is allowed.
+    fn size(&self, values: &[f64], accuracy: &Accuracy) -> f64 {
+        let moved = self.z.iter().zip(&self.base).map(|(z, b)| (z - b).abs());
+        let allowed = accuracy.absolute.iter().zip(moved);
+        let each = values.iter().zip(allowed).map(|(v, (&absolute, moved))| {
+            let part = (v / absolute.max(accuracy.relative * moved)).abs();
+            if part.is_nan() { f64::INFINITY } else { part }
+        });
+        each.fold(0.0, f64::max)
+    }
+
+    /// Derivatives at `z`, and their Jacobian where it is not `known`.
+    fn evaluate(&mut self, field: &mut Field<M>, at: &Dual<M>, known: bool) {
+        if !known {
+            field.linearise(at, &self.z, &mut self.derivative, &mut self.jacobian);
+            return;
+        }
+        for (p, &z) in self.point.iter_mut().zip(&self.z) {
+            *p = Dual::constant(z);
+        }
+        field.evaluate(at, &self.point, &mut self.slope);
+        for (d, s) in self.derivative.iter_mut().zip(&self.slope) {
+            *d = s.value;
+        }
+    }
+
+    /// Solves from the guess in `z`. False when it does not converge to `accuracy`. The factors are those at the solution where
+    /// slopes are wanted.
+    fn solve(
         &mut self,
         field: &mut Field<M>,
         at: &Dual<M>,
@@ -254,9 +294,14 @@ impl Newton {
             })
         };
         let mut before = f64::INFINITY;
+        // Size of the last change.
+        let mut last = None;
+        // Whether every iteration has a Jacobian of its own.
+        let mut exact = M > 0;
         self.taken.fill(0.0);
         for _ in 0..ITERATIONS {
-            field.linearise(at, &self.z, &mut self.derivative, &mut self.jacobian);
+            let known = !exact && self.factored == Some(step);
+            self.evaluate(field, at, known);
             for i in 0..n {
                 self.right[i] = self.base[i] + step * self.derivative[i] - self.z[i];
             }
@@ -270,28 +315,41 @@ impl Newton {
                     *t *= 0.5;
                     *z -= *t;
                 }
+                exact = true;
                 continue;
             }
             before = now;
-            let jacobian = &self.jacobian;
-            if !self
-                .factors
-                .factor(n, |i, j| f64::from(i == j) - step * jacobian[i * n + j])
-            {
-                return false;
+            if !known {
+                let jacobian = &self.jacobian;
+                let of = |i, j| f64::from(i == j) - step * jacobian[i * n + j];
+                self.factored = None;
+                if !self.factors.factor(n, of) {
+                    return false;
+                }
+                self.factored = Some(step);
             }
             self.taken.copy_from_slice(&self.right);
             self.factors.solve(&mut self.taken);
             for (t, z) in self.taken.iter().zip(&mut self.z) {
                 *z += t;
             }
-            let solved = |i: usize| {
-                let moved = accuracy.relative * (self.z[i] - self.base[i]).abs();
-                self.taken[i].abs() <= STAGE_ACCURACY * accuracy.absolute[i].max(moved)
+            let change = self.size(&self.taken, accuracy);
+            let left = match (known, last) {
+                (false, _) => change,
+                // Factors of a stiffer place make any change small: the residual itself is what counts.
+                (true, None) => change.max(self.size(&self.right, accuracy)),
+                (true, Some(last)) if change <= CONTRACTION * last => {
+                    change * change / (last - change)
+                }
+                (true, Some(_)) => {
+                    exact = true;
+                    f64::INFINITY
+                }
             };
-            if (0..n).all(solved) {
+            if left <= STAGE_ACCURACY {
                 return true;
             }
+            last = Some(change);
         }
         false
     }
