@@ -4,7 +4,7 @@
 //! two half steps agree. Where the explicit method needs many steps in a sample, the implicit one takes over. Across a switch
 //! (`sign`, a comparison) steps are shortened until they resolve its ramp.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector, Schur};
 
 use super::dual::Dual;
 use super::field::Field;
@@ -39,6 +39,12 @@ const ROUGH: u8 = 8;
 const STIFF: u8 = 7;
 /// Step times rate up to which the explicit method is stable (2.8 for rates that are real).
 const STABLE: f64 = 2.5;
+/// Where the explicit method is far from its limit, its rates are computed in every so many samples only.
+const SELDOM: usize = 8;
+/// ... which is below this part of the limit.
+const FAR: f64 = 0.25;
+/// Iterations for the eigenvalues of a Jacobian.
+const EIGENVALUES: usize = 1000;
 /// An implicit step costs about as much as so many explicit ones.
 pub(super) const IMPLICIT_COST: usize = 4;
 /// A run that may take so many steps a sample may take those of so many samples more at any time: what is hopeless ends early.
@@ -80,6 +86,10 @@ pub(super) struct StepControl<'p> {
     trusted: f64,
     /// Error of the step that was trusted last, as a part of that difference.
     per_indication: f64,
+    /// Rates of the modes that decay and that the explicit method may not damp; none where no step of a sample is too long.
+    decaying: Vec<Complex<f64>>,
+    /// Sample at which the rates are computed again.
+    examined_again: usize,
     /// Largest argument of each switch so far.
     largest: Vec<f64>,
     /// True when the ramps are to be found.
@@ -151,6 +161,8 @@ impl<'p> StepControl<'p> {
             tolerance: plant.accuracy,
             trusted: 0.0,
             per_indication: 0.0,
+            decaying: Vec::new(),
+            examined_again: 0,
             largest: vec![0.0; plant.tape.switches.len()],
             rough,
             middle: room.clone(),
@@ -221,6 +233,9 @@ impl<'p> StepControl<'p> {
             }
         }
         self.samples = k + 1;
+        if k >= self.examined_again {
+            self.examine(integrator, excitation.time(k), excitation.sample_time);
+        }
         for part in 0..integrator.parts.len() {
             let (start, length) = integrator.begin_part(part, excitation.time(k));
             self.part(integrator, &start, &length)?;
@@ -250,6 +265,41 @@ impl<'p> StepControl<'p> {
             let moved = (x - start).abs();
             *first = if moved.is_finite() { moved } else { 0.0 };
         }
+    }
+
+    /// Finds the rates that limit an explicit step. The stages of a step do not show those of modes at rest, whose values stay there by
+    /// chance and whose slopes grow.
+    fn examine(&mut self, integrator: &mut Integrator<0>, time: f64, sample_time: f64) {
+        let n = integrator.x.len();
+        self.allow(integrator, 0);
+        let x: Vec<f64> = integrator.x.iter().map(|x| x.value).collect();
+        let time = Dual::constant(time);
+        (integrator.field).linearise(&time, &x, &mut self.rates, &mut self.jacobian);
+        self.decaying.clear();
+        let fastest = sample_time * norm(&self.jacobian, &self.allowed);
+        let seldom = if fastest < FAR * STABLE { SELDOM } else { 1 };
+        self.examined_again = self.samples - 1 + seldom;
+        if fastest > STABLE && fastest.is_finite() {
+            let jacobian = DMatrix::from_row_slice(n, n, &self.jacobian);
+            if let Some(schur) = Schur::try_new(jacobian, f64::EPSILON, EIGENVALUES) {
+                let rates = schur.complex_eigenvalues();
+                let decaying = rates.iter().filter(|rate| rate.re < 0.0);
+                self.decaying.extend(decaying);
+            }
+        }
+    }
+
+    /// Whether an explicit step damps every mode that decays.
+    fn damps(&self, step: f64) -> bool {
+        let growth = |z: Complex<f64>| {
+            let powers = (1..=4).rev();
+            powers.fold(Complex::new(1.0, 0.0), |sum, k| {
+                sum * z / f64::from(k) + 1.0
+            })
+        };
+        self.decaying
+            .iter()
+            .all(|rate| growth(rate * step).norm() <= 1.0)
     }
 
     fn part(
@@ -369,6 +419,9 @@ impl<'p> StepControl<'p> {
             field.evaluate(&end, next, &mut self.end);
             worst(&self.error, &self.allowed) / EMBEDDED
         } else {
+            if !self.damps(step) {
+                return Attempt::Error(f64::INFINITY);
+            }
             stages.explicit(field, time, &whole, x, first, next);
             field.evaluate(&end, next, &mut self.end);
             self.allow_moved(x, next);

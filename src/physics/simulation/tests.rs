@@ -43,6 +43,31 @@ fn sensitivities_stay_bounded_where_friction_holds() {
     }
 }
 
+/// No stage of a step shows the fast mode of `z`, which stays 0 to the last bit; its sensitivity to `p` does not.
+#[test]
+fn modes_at_rest_limit_the_step() {
+    let text = "model R parameter Real p = 0; input Real u; output Real y; Real x(start=0); Real z(start=0);
+         equation der(x) = u - x; der(z) = p - 400*z*(1 + x^2); y = x + z; end R;";
+    let plant = Plant::new(parse(text).expect("a plant"));
+    let u: Vec<f64> = (0..400).map(|k| f64::from(u8::from(k % 40 < 20))).collect();
+    let excitation = Excitation {
+        inputs: &[&u],
+        length: u.len(),
+        sample_time: 0.02,
+        start_time: 0.0,
+        hold: Hold::Zero,
+    };
+    let (point, directions) = (plant.nominal(), [Direction::Parameter(0)]);
+    let run = plant.simulate(&point, &excitation, None).expect("a run");
+    let slopes = plant.sensitivities(&point, &excitation, None, &run.plan, &directions);
+    for (k, slope) in slopes[0][0].iter().enumerate().skip(1) {
+        let x = run.states[0][k];
+        // At rest `p = 400 z (1 + x^2)`.
+        let rest = 1.0 / (400.0 * (1.0 + x * x));
+        assert!((slope - rest).abs() < 0.02 * rest, "{k}: {slope} {rest}");
+    }
+}
+
 #[test]
 fn a_plant_without_states_is_simulated() {
     let text =

@@ -13,7 +13,7 @@ use crate::explain::engine::terms::names::called;
 use crate::explain::engine::terms::richer::richer;
 use crate::explain::engine::terms::term::{Needs, Port, Term, curve};
 use crate::explain::engine::terms::values::{grid, starts};
-use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH, limited};
+use crate::explain::engine::thresholds::{FINISHED, GLANCE, MOST_STEPS, ROUNDS, THOROUGH, limited};
 use crate::physics::estimate::{Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Unknown};
 
@@ -159,6 +159,8 @@ pub(in crate::explain::engine) fn also_elsewhere(
 /// Parts of a parameter by which it may change, and of the recording's length at which.
 const CHANGES: [f64; 2] = [-0.3, 0.3];
 const WHEN: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
+/// Of all these, the likeliest so many of a parameter are fitted.
+const STARTS: usize = 3;
 
 /// What begins at some time, or drifts, as a change of each parameter of its equations: a load as one that begins when it does, and a
 /// change of a parameter as one of the others. From the plant without it a fit may not get there, where parameters have gone to their
@@ -223,20 +225,41 @@ pub(in crate::explain::engine) fn as_parameter_changes(
         let starts: Vec<(&Fitted, (Vec<f64>, f64))> = (froms.iter())
             .flat_map(|from| of_from(from).into_iter().map(|start| (*from, start)))
             .collect();
-        let glanced = starts
-            .into_par_iter()
-            .filter_map(|(from, (shapes, strength))| {
-                let mut lead = Lead::untested(term, place).at(place, None, &shapes);
+        let begun =
+            |how: &(dyn Fn(&Study, &Fit) -> Option<Fit> + Sync), from, shapes: &[f64], strength| {
+                let mut lead = Lead::untested(term, place).at(place, None, shapes);
                 lead.strength = strength;
-                instead(from, lead, &glance, arguments, ground)
-            });
-        let best = glanced.min_by(|a, b| a.fit.deviance.total_cmp(&b.fit.deviance))?;
-        thoroughly(best, ground)
+                instead(from, lead, how, arguments, ground)
+            };
+        let as_it_is = |study: &Study, from: &Fit| {
+            let deviance = study.deviance(from)?;
+            Some(Fit {
+                deviance,
+                ..from.clone()
+            })
+        };
+        let mut starts: Vec<(f64, &Fitted, Vec<f64>, f64)> = (starts.into_par_iter())
+            .filter_map(|(from, (shapes, strength))| {
+                let deviance = begun(&as_it_is, from, &shapes, strength)?.fit.deviance;
+                Some((deviance, from, shapes, strength))
+            })
+            .collect();
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        starts.truncate(STARTS);
+        let glanced = (starts.into_par_iter())
+            .filter_map(|(_, from, shapes, strength)| begun(&glance, from, &shapes, strength));
+        glanced.min_by(|a, b| a.fit.deviance.total_cmp(&b.fit.deviance))
     };
     let pairs: Vec<(&'static Term, Place)> = terms
         .flat_map(|t| all.iter().filter(|p| beside(p)).map(move |p| (t, *p)))
         .collect();
-    pairs.into_par_iter().filter_map(changed).collect()
+    let mut glanced: Vec<Fitted> = pairs.into_par_iter().filter_map(changed).collect();
+    glanced.sort_by(|a, b| a.fit.deviance.total_cmp(&b.fit.deviance));
+    glanced.truncate(FINISHED);
+    let fits = glanced
+        .into_par_iter()
+        .filter_map(|g| thoroughly(g, ground));
+    fits.collect()
 }
 
 /// The size of a variable as what a parameter depends on: the saturation of iron is the same for both signs of a current.
@@ -328,6 +351,7 @@ fn clearly_better(
             forms.push(one);
         }
     }
+    forms.truncate(FINISHED);
     let thorough = forms.into_par_iter().filter_map(|f| thoroughly(f, ground));
     let resolved = thorough.filter(|f| f.is_resolved(ground.study));
     let better = resolved.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
