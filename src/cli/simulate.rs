@@ -13,7 +13,7 @@ use super::{Outcome, Verbosity};
 use crate::explain::Explanation;
 use crate::identify::{IdentifiedChannel, Model};
 use crate::log::{
-    Channel, Log, Reading, RoleNeed, Roles, Source, check_same_sampling, write_table,
+    Channel, Log, Reading, RoleNeed, Roles, Source, check_same_sampling, write_simulation,
 };
 use crate::report::{is_explanation, parse_explanation, read_model};
 
@@ -124,8 +124,9 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
     }
     let estimate = flags.estimate()?;
     let roles = flags.roles.of_model(&model.inputs, &model.outputs)?;
-    let (log, beginning) = read_inputs(&flags.input, &roles, estimate, say)?;
-    check_sampling(&name, &model, &log)?;
+    let (input, beginning) = read_inputs(&flags.input, &roles, estimate, say)?;
+    let log = &input.log;
+    check_sampling(&name, &model, log)?;
     if log.input_data.len() != model.inputs.len() {
         // Roles that need not be there are left out when they are not.
         let wanted: Vec<String> = model.inputs.iter().map(|c| c.channel.to_string()).collect();
@@ -160,15 +161,32 @@ pub(super) fn run(flags: Flags, say: Verbosity) -> anyhow::Result<Outcome> {
         .map(|c| &c.channel)
         .zip(outputs.iter().map(Vec::as_slice))
         .collect();
-    write_table(output.path(), log.sample_time, log.start_time, &columns)?;
+    input.write(output.path(), &columns)?;
     Ok(Outcome::Done)
 }
 
 /// A recording without gaps; what was recognised in it is said.
-fn read(source: &Source, roles: &Roles, need: RoleNeed, say: Verbosity) -> anyhow::Result<Log> {
-    let reading = Reading::read(source, roles, need)?;
+fn read(source: &Source, roles: &Roles, need: RoleNeed, say: Verbosity) -> anyhow::Result<Input> {
+    let mut reading = Reading::read(source, roles, need)?;
     tell_reading(&source.to_string(), reading.said.as_deref(), say);
-    Ok(reading.whole()?)
+    let rows = reading.rows.take();
+    Ok(Input {
+        log: reading.whole()?,
+        rows,
+    })
+}
+
+/// A recording without gaps, and the times of the rows of its file, where it lies on another grid.
+struct Input {
+    log: Log,
+    rows: Option<Vec<f64>>,
+}
+
+impl Input {
+    fn write(&self, path: &Path, columns: &[(&Channel, &[f64])]) -> anyhow::Result<()> {
+        let grid = (self.log.sample_time, self.log.start_time);
+        Ok(write_simulation(path, grid, self.rows.as_deref(), columns)?)
+    }
 }
 
 /// Inputs without gaps, and where the initial state is to be estimated, the beginning of the recording with its outputs, which may be
@@ -178,15 +196,17 @@ fn read_inputs(
     roles: &Roles,
     estimate: bool,
     say: Verbosity,
-) -> anyhow::Result<(Log, Option<Log>)> {
+) -> anyhow::Result<(Input, Option<Log>)> {
     if !estimate {
         return Ok((read(source, roles, RoleNeed::InputsOnly, say)?, None));
     }
     if !source.can_be_reopened() {
-        let log = read(source, roles, RoleNeed::InputsAndMaybeOutputs, say)?;
-        return Ok((log.clone(), Some(log)));
+        let input = read(source, roles, RoleNeed::InputsAndMaybeOutputs, say)?;
+        let beginning = input.log.clone();
+        return Ok((input, Some(beginning)));
     }
-    let log = read(source, roles, RoleNeed::InputsOnly, say)?;
+    let input = read(source, roles, RoleNeed::InputsOnly, say)?;
+    let log = &input.log;
     let parts = Reading::read(source, roles, RoleNeed::InputsAndMaybeOutputs)?;
     let part = parts.logs.into_iter().next();
     let beginning = part.filter(|p| (p.start_time - log.start_time).abs() < 0.5 * log.sample_time);
@@ -205,7 +225,7 @@ fn read_inputs(
             log.samples()
         ));
     }
-    Ok((log, Some(beginning)))
+    Ok((input, Some(beginning)))
 }
 
 /// The explanation in `path`, if that is one; `-` and unreadable files are left to the reader of models.
@@ -237,7 +257,8 @@ fn simulate_explanation(
     let outputs: Vec<IdentifiedChannel> = model.outputs.iter().map(channel).collect();
     let estimate = flags.estimate()?;
     let roles = flags.roles.of_model(&inputs, &outputs)?;
-    let (log, beginning) = read_inputs(&flags.input, &roles, estimate, say)?;
+    let (input, beginning) = read_inputs(&flags.input, &roles, estimate, say)?;
+    let log = &input.log;
     check_same_sampling(&name, model.sample_time, &log.name, log.sample_time)?;
     let columns: Vec<&[f64]> = log.input_data.iter().map(Vec::as_slice).collect();
     let start = if let Some(beginning) = &beginning {
@@ -262,12 +283,15 @@ fn simulate_explanation(
                 time: None,
                 ..roles.clone()
             };
-            Some(read(
-                &Source::from(file.clone()),
-                &named,
-                RoleNeed::OutputsOnly,
-                say,
-            )?)
+            Some(
+                read(
+                    &Source::from(file.clone()),
+                    &named,
+                    RoleNeed::OutputsOnly,
+                    say,
+                )?
+                .log,
+            )
         }
         None => None,
     };
@@ -306,7 +330,7 @@ fn simulate_explanation(
         .iter()
         .zip(outputs.iter().map(Vec::as_slice))
         .collect();
-    write_table(output.path(), log.sample_time, log.start_time, &table)?;
+    input.write(output.path(), &table)?;
     Ok(Outcome::Done)
 }
 

@@ -67,4 +67,5 @@ pub(crate) use time::Origin;
 pub(crate) use time::counted;
 #[cfg(feature = "cli")]
 pub(crate) use write::write_file_atomically;
+pub(crate) use write::write_simulation;
 pub use write::{CsvWriter, write_table};

@@ -28,6 +28,8 @@ pub struct Reading {
     pub origin: Option<Origin>,
     /// What was recognised and repaired, on one line; nothing of a plain file.
     pub said: Option<String>,
+    /// Times of the rows of the file in seconds, where the one recording lies on another grid that was not asked for.
+    pub rows: Option<Vec<f64>>,
 }
 
 impl Log {
@@ -137,6 +139,7 @@ impl Reading {
             logs: vec![log],
             origin: None,
             said: None,
+            rows: None,
         }
     }
 
@@ -189,7 +192,15 @@ impl Reading {
             sha256: &sha256,
         }
         .logs(&mut said)?;
+        let times = table.stamps.as_ref().map(|stamps| &stamps.seconds);
+        let rows = match (&assembled[..], times) {
+            ([log], Some(times)) if roles.resample.is_none() && roles.sample_time.is_none() => {
+                (times.len() != log.samples()).then(|| times.clone())
+            }
+            _ => None,
+        };
         Ok(Self {
+            rows,
             logs: assembled,
             origin: table.stamps.as_ref().and_then(|stamps| stamps.origin),
             said: (!said.is_empty()).then(|| said.join("; ")),

@@ -63,6 +63,14 @@ impl RoleFlags {
         self.inputs.is_some() || self.outputs.is_some()
     }
 
+    /// The same with gaps bridged, where nothing else is asked for.
+    pub(crate) fn bridged(&self) -> Option<Self> {
+        self.missing.is_none().then(|| Self {
+            missing: Some(MissingFlag::Interpolate),
+            ..self.clone()
+        })
+    }
+
     /// The roles as asked for.
     pub(crate) fn roles(self) -> Roles {
         Roles {

@@ -152,7 +152,8 @@ pub(crate) fn read_recordings(
     say: Verbosity,
 ) -> anyhow::Result<(Vec<Log>, Vec<Recording>)> {
     let channels = channels(plant);
-    read_channels(plant, (&channels, &channels), sources, flags, need, say)
+    let read = read_channels(plant, (&channels, &channels), sources, flags, need, say)?;
+    Ok((read.logs, read.known))
 }
 
 /// Reads these channels of a plant, in its units, by the names of columns; a recording with gaps is several.
@@ -163,7 +164,7 @@ pub(super) fn read_channels(
     flags: &RoleFlags,
     need: RoleNeed,
     say: Verbosity,
-) -> anyhow::Result<(Vec<Log>, Vec<Recording>)> {
+) -> anyhow::Result<Recordings> {
     let roles = kept_missing(flags.clone().of_model(inputs, outputs)?);
     let need = if inputs.is_empty() {
         RoleNeed::OutputsOnly
@@ -175,7 +176,7 @@ pub(super) fn read_channels(
             Ok(of_names) => other_names(of_names, inputs, outputs),
             Err(other) => other,
         })?;
-    for said in units_of_logs(&plant.spec, of_plant, &read.0)? {
+    for said in units_of_logs(&plant.spec, of_plant, &read.logs)? {
         if !say.quiet {
             note(&format!("warning: {said}\n"));
         }
@@ -192,13 +193,22 @@ pub(crate) fn kept_missing(roles: Roles) -> Roles {
     Roles { missing, ..roles }
 }
 
+/// Recordings as they were read.
+pub(crate) struct Recordings {
+    pub(crate) logs: Vec<Log>,
+    /// Where each is from.
+    pub(crate) known: Vec<Recording>,
+    /// Times of the rows of the only file, where the recording lies on another grid that was not asked for.
+    pub(crate) rows: Option<Vec<f64>>,
+}
+
 /// Reads recordings with these columns; one with gaps is several. Where all have dates, time counts from the first of the first.
 pub(crate) fn read_with(
     roles: &Roles,
     sources: &[Source],
     need: RoleNeed,
     say: Verbosity,
-) -> anyhow::Result<(Vec<Log>, Vec<Recording>)> {
+) -> anyhow::Result<Recordings> {
     let mut readings = Vec::new();
     for source in sources {
         let reading = Reading::read(source, roles, need)?;
@@ -207,7 +217,11 @@ pub(crate) fn read_with(
     }
     let first = readings.first().and_then(|r| r.origin);
     let first = first.filter(|_| readings.iter().all(|r| r.origin.is_some()));
-    let (mut logs, mut recordings) = (Vec::new(), Vec::new());
+    let rows = match &mut readings[..] {
+        [only] => only.rows.take(),
+        _ => None,
+    };
+    let (mut logs, mut known) = (Vec::new(), Vec::new());
     for mut reading in readings {
         if let (Some(origin), Some(first)) = (reading.origin, first) {
             let later = origin.since(&first);
@@ -215,7 +229,7 @@ pub(crate) fn read_with(
             reading.origin = Some(first);
         }
         for log in &reading.logs {
-            recordings.push(Recording {
+            known.push(Recording {
                 name: log.name.clone(),
                 sha256: log.sha256.clone(),
                 samples: log.samples(),
@@ -226,7 +240,7 @@ pub(crate) fn read_with(
         }
         logs.extend(reading.logs);
     }
-    Ok((logs, recordings))
+    Ok(Recordings { logs, known, rows })
 }
 
 /// An error of reading, with the way to read a recording that has other names than the plant.

@@ -12,7 +12,7 @@ use crate::cli::terminal::note;
 use crate::cli::{Outcome, Verbosity};
 use crate::explain::{AugmentedPlant, EffectFound};
 use crate::identify::Recording;
-use crate::log::{Channel, Log, Origin, RoleNeed, Roles, Source, write_table};
+use crate::log::{Channel, Log, Origin, RoleNeed, Roles, Source, write_simulation};
 use crate::physics::estimate::{PlantRecording, start_by_least_squares};
 use crate::physics::{Hold, Plant, Point, Trajectory, VariableId};
 use crate::report::{PlantDocument, is_plant, significant};
@@ -73,17 +73,28 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         .retain(|i| found.is_none_or(|f| !f.simulated_inputs.contains(&i.channel.name)));
     let remembered = found.and_then(|f| remembered(f, &columns));
     let source = std::slice::from_ref(asked.input);
-    let of =
-        |names: &Channels| read_channels(&plant, (&columns, names), source, asked.roles, need, say);
-    let (mut logs, read) = match (&remembered, of(&columns)) {
-        (Some(names), Err(error)) if error.is::<OtherNames>() && !asked.roles.names_columns() => {
-            of(names).map_err(|other| match other.is::<OtherNames>() {
-                true => error,
-                false => other,
-            })
+    let with = |roles: &RoleFlags| {
+        let of =
+            |names: &Channels| read_channels(&plant, (&columns, names), source, roles, need, say);
+        match (&remembered, of(&columns)) {
+            (Some(names), Err(error)) if error.is::<OtherNames>() && !roles.names_columns() => {
+                of(names).map_err(|other| match other.is::<OtherNames>() {
+                    true => error,
+                    false => other,
+                })
+            }
+            (_, by_plant) => by_plant,
         }
-        (_, by_plant) => by_plant,
-    }?;
+    };
+    let mut read = with(asked.roles)?;
+    // A simulation goes on over a gap; what the inputs did there is said.
+    if read.logs.len() > 1
+        && asked.input.can_be_reopened()
+        && let Some(bridged) = asked.roles.bridged()
+    {
+        read = with(&bridged)?;
+    }
+    let (mut logs, rows) = (read.logs, read.rows);
     if logs.len() != 1 {
         anyhow::bail!(
             "{}: samples are missing in the middle; a simulation needs one without gaps (--missing interpolate)",
@@ -97,7 +108,7 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         (_, Some(explanation)) => &explanation.recordings[..],
         _ => &[],
     };
-    log.start_time += later(known, &read).unwrap_or(0.0);
+    log.start_time += later(known, &read.known).unwrap_or(0.0);
     let simulated = match (asked.simulation, found) {
         (Some(file), Some(found)) => Some(simulated(found, file, asked.roles, say)?),
         _ => None,
@@ -171,7 +182,8 @@ pub(crate) fn run(asked: &PlantRun, say: Verbosity) -> anyhow::Result<Outcome> {
         .iter()
         .zip(outputs.iter().map(Vec::as_slice))
         .collect();
-    write_table(asked.output, log.sample_time, start_time, &columns)?;
+    let grid = (log.sample_time, start_time);
+    write_simulation(asked.output, grid, rows.as_deref(), &columns)?;
     Ok(Outcome::Done)
 }
 
@@ -260,7 +272,7 @@ fn simulated(
         ..roles.clone().roles()
     };
     let source = Source::from(file.to_owned());
-    let (mut logs, _) = read_with(&roles, &[source], RoleNeed::OutputsOnly, say)?;
+    let mut logs = read_with(&roles, &[source], RoleNeed::OutputsOnly, say)?.logs;
     if logs.len() != 1 {
         anyhow::bail!(
             "{}: samples are missing in the middle; give the simulator's answer without gaps",

@@ -86,7 +86,8 @@ pub(crate) fn run(
     let output = output.map(|o| Output::check(o, &read)).transpose()?;
     let parameters = simulator_parameters::read(file)?;
     let roles = kept_missing(roles.clone().roles());
-    let (logs, recordings) = read_with(&roles, logs, RoleNeed::Identify, say)?;
+    let read = read_with(&roles, logs, RoleNeed::Identify, say)?;
+    let (logs, recordings) = (read.logs, read.known);
     let first = logs
         .first()
         .ok_or_else(|| anyhow::anyhow!("there is no recording"))?;

@@ -7,7 +7,7 @@ use super::search::{Found, HALF_WAY, Question, forward};
 use super::step::Step;
 use super::terms::documentation::PLANT_EFFECTS;
 use super::terms::names::{family, named, special_case};
-use super::thresholds::{IMITATED, LEFT, NEEDED, SECOND, chance};
+use super::thresholds::{IMITATED, LEFT, NEEDED, SECOND, chance, is_spent};
 use crate::physics::estimate::{EstimateError, Fit, Study};
 
 /// Other first effects beside which a second is looked for, where what was found leaves structure.
@@ -139,7 +139,7 @@ fn pairs(question: Question, found: &Found) -> Vec<Found> {
             .iter()
             .any(|p| p.steps[0].first().is_some_and(its_family));
         let as_other = proven(other) && id(other) != "law" && tried.len() < most && !again;
-        if !(as_special_case || as_other) {
+        if !(as_special_case || as_other) || is_spent(question.plant) {
             continue;
         }
         tried.push(other.lead.term.id);

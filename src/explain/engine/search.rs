@@ -325,6 +325,7 @@ pub(super) fn forward(
     let mut on_trial = false;
     for _ in 0..=MOST + 2 {
         let count = accepted_so_far;
+        now = now.counting_with(plant);
         let mut study = Study::new(&now, recordings, &options)?;
         if least_squares {
             let share = study.effective_share(&fit).unwrap_or(1.0);

@@ -17,7 +17,7 @@ use crate::explain::engine::pairs::search;
 use crate::explain::engine::scope::Scope;
 use crate::explain::engine::search::{Found, Objective, Question};
 use crate::explain::engine::terms::names::named;
-use crate::explain::engine::thresholds::{MOST_STEPS, SECOND, chance, limited};
+use crate::explain::engine::thresholds::{MOST_STEPS, SECOND, chance, is_spent, limited};
 use crate::physics::estimate::{EstimateError, Fit, Form, PlantRecording, Study};
 use crate::physics::{Hold, Plant};
 
@@ -56,6 +56,7 @@ pub(crate) fn select(
     hold: Hold,
     scope: &Scope,
 ) -> Result<Found, EstimateError> {
+    let plant = &plant.clone().counting();
     let mut found = decide_by_part(plant, recordings, hold, scope)?;
     found.estimate_initial_states(recordings);
     Ok(found)
@@ -135,7 +136,7 @@ fn decide(
         _ => adequate || little_left && !misspecified,
     } && stands
         && free_run;
-    if stays && !(judged && holds && proved) {
+    if stays && !(judged && holds && proved) && !is_spent(plant) {
         let known = rivals
             .iter()
             .find(|r| r.accepted == 0 && r.estimator == Estimator::FreeRun)

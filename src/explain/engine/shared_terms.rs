@@ -13,7 +13,7 @@ const MOST: usize = 8;
 /// Larger texts stay as they are: terms are compared each with each.
 const MOST_NODES: usize = 2000;
 
-/// The plant with a variable for terms that several rates share; none where there are no such terms.
+/// The plant with a variable for terms that several rates and outputs share; none where there are no such terms.
 pub(crate) fn with_shared_terms(spec: &ModelSpec) -> Option<ModelSpec> {
     let mut found: Option<ModelSpec> = None;
     let most = if spec.expressions.len() > MOST_NODES {
@@ -22,7 +22,8 @@ pub(crate) fn with_shared_terms(spec: &ModelSpec) -> Option<ModelSpec> {
         MOST
     };
     for _ in 0..most {
-        match shared(found.as_ref().unwrap_or(spec)) {
+        let now = found.as_ref().unwrap_or(spec);
+        match shared(now).or_else(|| shared_product(now)) {
             Some(next) => found = Some(next),
             None => break,
         }
@@ -136,6 +137,175 @@ fn shared(spec: &ModelSpec) -> Option<ModelSpec> {
     edit.apply(spec).ok()
 }
 
+/// A factor of a product: an expression that is the same for the same factor, and its text.
+#[derive(Clone)]
+struct Factor {
+    below: bool,
+    key: String,
+    text: String,
+    moves: bool,
+}
+
+/// The same product of several rates and outputs, each with factors of its own, such as what flows out of a store and what a
+/// gauge shows of it: one variable more in the place of what they have in common.
+fn shared_product(spec: &ModelSpec) -> Option<ModelSpec> {
+    let products = products(spec);
+    let mut best: Vec<Factor> = vec![];
+    for (i, a) in products.iter().enumerate() {
+        for b in products[i + 1..]
+            .iter()
+            .filter(|b| b.equation != a.equation)
+        {
+            let common = a.common(b);
+            // A name and a number, or what is shared already, is no term.
+            let term = common.iter().any(|f| f.moves) && common.iter().any(|f| !f.moves);
+            if term && common.len() > best.len() {
+                best = common;
+            }
+        }
+    }
+    best.first()?;
+    let name = free_name(spec, SHARED_TERM);
+    let mut edit = Edit {
+        declarations: vec![format!("Real {name};")],
+        equations: vec![format!("{name} = {};", product_text(&best, None))],
+        ..Edit::default()
+    };
+    for at in 0..spec.equations.len() {
+        let of_equation = products.iter().filter(|p| p.equation == at);
+        let pieces = of_equation.filter_map(|p| Some((p.span, p.with(&best, &name)?)));
+        let pieces: Vec<(Span, String)> = pieces.collect();
+        if !pieces.is_empty() {
+            let right = spec.expressions.span(spec.equations[at].right);
+            let text = substituted(&spec.text, right, pieces);
+            edit.changes.push((Place::Equation(at), text));
+        }
+    }
+    edit.apply(spec).ok()
+}
+
+/// A product that is a term of a sum.
+struct Product {
+    equation: usize,
+    span: Span,
+    sign: f64,
+    factors: Vec<Factor>,
+}
+
+impl Product {
+    /// The factors that both have.
+    fn common(&self, other: &Self) -> Vec<Factor> {
+        let mut rest: Vec<&Factor> = other.factors.iter().collect();
+        let mut both = self.factors.clone();
+        both.retain(|f| {
+            let same = |o: &&Factor| o.below == f.below && o.key == f.key;
+            let at = rest.iter().position(same);
+            at.map(|at| rest.swap_remove(at)).is_some()
+        });
+        both
+    }
+
+    /// The text with a variable in the place of these factors; none where it lacks one.
+    fn with(&self, factors: &[Factor], name: &str) -> Option<String> {
+        let mut rest = self.factors.clone();
+        for factor in factors {
+            let same = |o: &Factor| o.below == factor.below && o.key == factor.key;
+            rest.swap_remove(rest.iter().position(same)?);
+        }
+        let text = product_text(&rest, Some(name));
+        Some(match self.sign < 0.0 {
+            true => format!("(-{text})"),
+            false => text,
+        })
+    }
+}
+
+fn product_text(factors: &[Factor], name: Option<&str>) -> String {
+    let part = |below: bool| -> Vec<&str> {
+        let those = factors.iter().filter(|f| f.below == below);
+        those.map(|f| f.text.as_str()).collect()
+    };
+    let mut above = part(false);
+    above.extend(name);
+    let above = match above.is_empty() {
+        true => "1".to_owned(),
+        false => above.join("*"),
+    };
+    let below = part(true)
+        .iter()
+        .map(|text| format!("/{text}"))
+        .collect::<String>();
+    format!("{above}{below}")
+}
+
+/// The products of all rates and outputs that have several factors.
+fn products(spec: &ModelSpec) -> Vec<Product> {
+    let outputs = spec.outputs();
+    let counts = |unknown: Unknown| match unknown {
+        Unknown::Derivative(_) => true,
+        Unknown::Value(v) => outputs.contains(&v),
+    };
+    let mut found = Vec::new();
+    for (equation, e) in spec.equations.iter().enumerate() {
+        if !counts(e.unknown) {
+            continue;
+        }
+        for (_, parts) in sums_in(spec, e.right) {
+            for (_, id) in parts {
+                let (sign, factors) = factors(spec, id);
+                if factors.len() > 1 {
+                    let span = spec.expressions.span(id);
+                    found.push(Product {
+                        equation,
+                        span,
+                        sign,
+                        factors,
+                    });
+                }
+            }
+        }
+    }
+    found
+}
+
+/// The factors of a product, and its sign.
+fn factors(spec: &ModelSpec, id: ExpressionId) -> (f64, Vec<Factor>) {
+    let mut sign = 1.0;
+    let mut factors = Vec::new();
+    let mut waiting = vec![(id, false)];
+    while let Some((id, below)) = waiting.pop() {
+        match spec.expressions.node(id) {
+            Node::Binary(Binary::Multiply, a, b) => waiting.extend([(a, below), (b, below)]),
+            Node::Binary(Binary::Divide, a, b) => waiting.extend([(a, below), (b, !below)]),
+            node => {
+                let (own, key) = canonical(spec, id);
+                sign *= own;
+                let span = spec.expressions.span(id);
+                let text = &spec.text[span.start..span.end];
+                let text = match (own < 0.0, node) {
+                    (true, _) => format!("(-({text}))"),
+                    (false, Node::Number(_) | Node::Variable(_) | Node::Call(..)) => {
+                        text.to_owned()
+                    }
+                    (false, _) => format!("({text})"),
+                };
+                let moves = |v: &VariableId| {
+                    let kind = spec.variable(*v).kind;
+                    !matches!(kind, VariableKind::Parameter | VariableKind::Constant)
+                };
+                let moves = spec.expressions.variables(id).iter().any(moves);
+                factors.push(Factor {
+                    below,
+                    key,
+                    text,
+                    moves,
+                });
+            }
+        }
+    }
+    (sign, factors)
+}
+
 /// The sums of all rates.
 fn sums(spec: &ModelSpec) -> Vec<Sum> {
     let mut found = Vec::new();
@@ -218,26 +388,11 @@ fn canonical(spec: &ModelSpec, id: ExpressionId) -> (f64, String) {
             (first, format!("({text})"))
         }
         Node::Binary(Binary::Multiply | Binary::Divide, _, _) => {
-            let mut sign = 1.0;
-            let mut factors = Vec::new();
-            let mut waiting = vec![(id, false)];
-            while let Some((id, below)) = waiting.pop() {
-                match spec.expressions.node(id) {
-                    Node::Binary(Binary::Multiply, a, b) => {
-                        waiting.extend([(a, below), (b, below)]);
-                    }
-                    Node::Binary(Binary::Divide, a, b) => {
-                        waiting.extend([(a, below), (b, !below)]);
-                    }
-                    _ => {
-                        let (own, key) = canonical(spec, id);
-                        sign *= own;
-                        factors.push(format!("{}{key}", if below { '/' } else { '*' }));
-                    }
-                }
-            }
-            factors.sort_unstable();
-            (sign, factors.concat())
+            let (sign, factors) = factors(spec, id);
+            let key = |f: &Factor| format!("{}{}", if f.below { '/' } else { '*' }, f.key);
+            let mut keys: Vec<String> = factors.iter().map(key).collect();
+            keys.sort_unstable();
+            (sign, keys.concat())
         }
         Node::Call(Function::Abs, a) => (1.0, format!("abs({})", canonical(spec, a).1)),
         Node::Variable(v) => (1.0, spec.variable(v).name.clone()),
@@ -306,6 +461,39 @@ mod tests {
             made("der(s) = v; m*der(v) = u - k*s; n*der(w) = u - c*w;"),
             None
         );
+    }
+
+    #[test]
+    fn what_flows_out_and_what_a_gauge_shows_of_it_share_a_product() {
+        let text = "model M parameter Real k = 1; parameter Real a = 2; parameter Real c = 3; input Real u; output Real y;
+             Real s; equation der(s) = u - k*sqrt(s)/c; y = -a*k*sqrt(s); end M;";
+        let spec = with_shared_terms(&parse(text).unwrap()).unwrap();
+        assert!(
+            spec.text.contains("= k*sqrt(s)") || spec.text.contains("= sqrt(s)*k"),
+            "{}",
+            spec.text
+        );
+        assert_eq!(spec.text.matches("shared_term").count(), 4, "{}", spec.text);
+        // Nothing of the plant is changed.
+        let runs = [&parse(text).unwrap(), &spec].map(|spec| {
+            let plant = crate::physics::Plant::new(spec.clone());
+            let input = [1.0; 20];
+            let excitation = crate::physics::Excitation {
+                inputs: &[&input],
+                length: 20,
+                sample_time: 0.1,
+                start_time: 0.0,
+                hold: crate::physics::Hold::Zero,
+            };
+            plant
+                .simulate(&plant.nominal(), &excitation, None)
+                .unwrap()
+                .outputs
+        });
+        assert_eq!(runs[0].len(), runs[1].len());
+        for (a, b) in runs[0][0].iter().zip(&runs[1][0]) {
+            assert!((a - b).abs() < 1e-6, "{a} {b}");
+        }
     }
 
     #[test]

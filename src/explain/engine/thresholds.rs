@@ -32,7 +32,9 @@ const CHEAP_STEPS: usize = 200_000;
 /// A plant that may need so many steps a sample, and more where it needed them before, or there are few samples.
 pub(crate) fn limited(plant: Plant, study: &Study, most: usize) -> Plant {
     let own = TIMES_OWN * study.steps_a_sample();
-    plant.with_most_steps(most.max(own).max(CHEAP_STEPS / study.samples().max(1)))
+    plant
+        .counting_with(study.plant())
+        .with_most_steps(most.max(own).max(CHEAP_STEPS / study.samples().max(1)))
 }
 /// The best of these are fitted with a noise model of their own, and the best of them until nothing changes.
 pub(crate) const FITTED: usize = 5;
@@ -58,6 +60,15 @@ pub(crate) const COMPARED: Effort = Effort {
     attempts: 6,
 };
 pub(crate) const ROUNDS: usize = 2;
+/// Operations of runs after which nothing is begun that an answer can do without: other pairs of effects, and a search for the free
+/// run. The answers for 64 plants of eight kinds take 2e8 to 3e9; this is about a minute of two cores.
+const MOST_WORK: u64 = 4_000_000_000;
+
+/// Whether so much has been tried that only what has begun is finished.
+pub(crate) fn is_spent(plant: &Plant) -> bool {
+    plant.work() > MOST_WORK
+}
+
 /// Gain in Schwarz's criterion that is needed, beyond the penalty for what was searched: odds of e^8 (math/physics.md).
 pub(crate) const NEEDED: f64 = 16.0;
 /// A name is given where the gain is at least this; between [`NEEDED`] and this the place is given, and the best term as a

@@ -49,6 +49,8 @@ pub struct CsvWriter {
     start_time: f64,
     /// 1 / sample time, when that is a whole number and the division exact: k / 10 is 0.3 where 3 * 0.1 is not.
     rate: Option<f64>,
+    /// Times of the rows, where they are not those of a grid.
+    times: Option<Vec<f64>>,
     channels: Vec<String>,
     samples: usize,
 }
@@ -88,6 +90,7 @@ impl CsvWriter {
             sample_time,
             start_time,
             rate,
+            times: None,
             channels,
             samples: 0,
         };
@@ -163,7 +166,9 @@ impl CsvWriter {
             let since = self
                 .rate
                 .map_or(sample * self.sample_time, |rate| sample / rate);
-            write_number(&mut self.output, self.start_time + since)?;
+            let given = (self.times.as_ref()).and_then(|times| times.get(self.samples as usize));
+            let time = given.copied().unwrap_or(self.start_time + since);
+            write_number(&mut self.output, time)?;
             for column in columns {
                 self.output.write_all(b",")?;
                 write_number(
@@ -231,4 +236,39 @@ pub fn write_table(
             .collect::<Vec<_>>(),
     )?;
     writer.finish()
+}
+
+/// Writes a simulation; where it lies on another grid than the rows of its input, with a row for each of those, at its time.
+///
+/// # Errors
+/// As those of [`write_table`].
+pub(crate) fn write_simulation(
+    path: &Path,
+    (sample_time, start_time): (f64, f64),
+    rows: Option<&[f64]>,
+    columns: &[(&Channel, &[f64])],
+) -> Result<(), LogError> {
+    let Some(times) = rows else {
+        return write_table(path, sample_time, start_time, columns);
+    };
+    let channels = columns.iter().map(|(channel, _)| *channel);
+    let mut writer = CsvWriter::create(path, sample_time, start_time, channels)?;
+    writer.times = Some(times.to_vec());
+    let of_rows =
+        |(_, column): &(&Channel, &[f64])| at_times(column, start_time, sample_time, times);
+    writer.write_block(&columns.iter().map(of_rows).collect::<Vec<_>>())?;
+    writer.finish()
+}
+
+/// A column at other times than those of its grid: on a line between two samples, and as at the ends beyond them.
+fn at_times(column: &[f64], start_time: f64, sample_time: f64, times: &[f64]) -> Vec<f64> {
+    let last = column.len().saturating_sub(1);
+    let value = |&time: &f64| {
+        let place = ((time - start_time) / sample_time).clamp(0.0, last as f64);
+        let before = place.floor() as usize;
+        let [a, b] = [before, (before + 1).min(last)].map(|k| column.get(k).copied());
+        let (a, b) = (a.unwrap_or(f64::NAN), b.unwrap_or(f64::NAN));
+        a + (place - before as f64) * (b - a)
+    };
+    times.iter().map(value).collect()
 }

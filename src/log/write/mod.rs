@@ -4,4 +4,5 @@ mod atomic;
 mod csv_writer;
 
 pub use atomic::write_file_atomically;
+pub(crate) use csv_writer::write_simulation;
 pub use csv_writer::{CsvWriter, write_table};

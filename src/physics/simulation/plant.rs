@@ -3,6 +3,9 @@
 //! A run without slopes chooses the steps within each sample. Slopes ([`Plant::sensitivities`]) are those of the same steps, so
 //! that they are the derivatives of what [`Plant::simulate`] computes.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use nalgebra::DMatrix;
 
 use super::dual::Dual;
@@ -230,6 +233,8 @@ pub struct Plant {
     pub(in crate::physics) accuracy: f64,
     /// Steps a sample that a run may take on average, where fewer are allowed than is usual.
     pub(super) most_steps: Option<usize>,
+    /// What all runs of this plant and of those that [count together](Self::counting_with) have cost.
+    work: Arc<AtomicU64>,
 }
 
 impl Plant {
@@ -249,6 +254,7 @@ impl Plant {
             nominal: None,
             accuracy: STEP_ACCURACY,
             most_steps: None,
+            work: Arc::default(),
         }
     }
 
@@ -286,6 +292,30 @@ impl Plant {
     pub(crate) fn with_most_steps(mut self, steps: usize) -> Self {
         self.most_steps = Some(steps);
         self
+    }
+
+    /// The plant whose runs count as work of another's.
+    pub(crate) fn counting_with(mut self, other: &Plant) -> Self {
+        self.work = Arc::clone(&other.work);
+        self
+    }
+
+    /// The plant whose runs are counted from now on.
+    pub(crate) fn counting(mut self) -> Self {
+        self.work = Arc::default();
+        self
+    }
+
+    /// Operations of all runs so far: the same on any machine and with any number of threads.
+    pub(crate) fn work(&self) -> u64 {
+        self.work.load(Ordering::Relaxed)
+    }
+
+    /// Counts steps of a run, each with so many numbers for a value.
+    fn count(&self, steps: usize, numbers: usize) {
+        let operations = self.tape.operations() + self.tape.states.len();
+        let done = (steps * numbers * operations) as u64;
+        self.work.fetch_add(done, Ordering::Relaxed);
     }
 
     /// Initial states at `point`.
@@ -422,6 +452,24 @@ impl Plant {
         self.check(excitation)?;
         let mut integrator = self.integrator::<0>(point, excitation, widths.unwrap_or(&[]), &[]);
         let mut control = StepControl::new(self, &integrator, widths.is_none(), most_steps);
+        let run = self.run_with(&mut integrator, &mut control, excitation, observer);
+        self.count(control.attempts() + excitation.length, 1);
+        let (outputs, states) = run?;
+        Ok(Trajectory {
+            outputs,
+            states,
+            plan: control.plan(&self.tape, &integrator.field.frame.width),
+        })
+    }
+
+    /// Outputs and states at every sample.
+    fn run_with(
+        &self,
+        integrator: &mut Integrator<0>,
+        control: &mut StepControl,
+        excitation: &Excitation,
+        observer: Option<&Observer>,
+    ) -> Result<(Vec<Vec<f64>>, Vec<Vec<f64>>), SimulationError> {
         let column = || Vec::with_capacity(excitation.length);
         let mut outputs: Vec<Vec<f64>> = self.tape.outputs.iter().map(|_| column()).collect();
         let mut states: Vec<Vec<f64>> = self.tape.states.iter().map(|_| column()).collect();
@@ -438,22 +486,18 @@ impl Plant {
             }
             if let Some(at) = outputs.iter().position(|o| !o[k].is_finite()) {
                 return Err(self
-                    .not_a_number(&integrator, excitation.time(k))
-                    .unwrap_or_else(|| self.diverged(&integrator, excitation.time(k), at)));
+                    .not_a_number(integrator, excitation.time(k))
+                    .unwrap_or_else(|| self.diverged(integrator, excitation.time(k), at)));
             }
             integrator.correct(k, excitation, observer, &self.tape.outputs, &[]);
             if k + 1 < excitation.length {
                 if !integrator.propagate(k, excitation) {
-                    control.advance(&mut integrator, k, excitation)?;
+                    control.advance(integrator, k, excitation)?;
                 }
-                self.bounded(&integrator, &limits, excitation.time(k + 1))?;
+                self.bounded(integrator, &limits, excitation.time(k + 1))?;
             }
         }
-        Ok(Trajectory {
-            outputs,
-            states,
-            plan: control.plan(&self.tape, &integrator.field.frame.width),
-        })
+        Ok((outputs, states))
     }
 
     /// Whether no state has diverged.
@@ -566,6 +610,7 @@ impl Plant {
         directions: &[Direction],
     ) -> Vec<Vec<Vec<f64>>> {
         let mut integrator = self.integrator::<M>(point, excitation, &plan.widths, directions);
+        self.count(plan.steps.len() + excitation.length, 1 + M);
         let mut columns = vec![
             vec![Vec::with_capacity(excitation.length); directions.len()];
             self.tape.outputs.len()

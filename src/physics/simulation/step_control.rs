@@ -176,6 +176,11 @@ impl<'p> StepControl<'p> {
         }
     }
 
+    /// Steps tried so far; an implicit one counts as several where a run is limited.
+    pub(crate) fn attempts(&self) -> usize {
+        self.attempts
+    }
+
     /// The steps, with the ramps that they resolve; after a rough run those for the arguments seen.
     pub(crate) fn plan(self, tape: &Tape, used: &[f64]) -> Plan {
         let found = |(largest, s): (&f64, &SwitchSlots)| match (s.moves, s.of_states) {

@@ -161,6 +161,11 @@ impl Tape {
         }
     }
 
+    /// How many instructions a derivative takes.
+    pub(crate) fn operations(&self) -> usize {
+        self.part(Level::States).len()
+    }
+
     /// A frame with literals set and no derivative.
     pub(crate) fn frame<const M: usize>(&self) -> Frame<M> {
         let slots = self.leaves + self.instructions.len();
