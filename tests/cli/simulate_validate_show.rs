@@ -474,3 +474,37 @@ fn an_explanation_remembers_the_names_of_the_columns() {
     let message = folder.run(&["simulate", "e.json", "third.csv"]).error();
     assert!(message.contains("`--inputs` for u"), "{message}");
 }
+
+/// A lag of 2 s after a step of its input at the first of these times, as a recording.
+fn lag_at(times: &[f64]) -> String {
+    let mut text = "t,u,y\n".to_owned();
+    for t in times {
+        let y = 1.0 - (-(t - times[0]) / 2.0).exp();
+        text.push_str(&format!("{t},100,{y:.9}\n"));
+    }
+    text
+}
+
+#[test]
+fn a_simulation_has_the_rows_of_its_input() {
+    let folder = Folder::new();
+    folder.text("lag.mo", LAG);
+    // Irregular times, and times with a gap.
+    let irregular = [0.0, 0.13, 0.31, 0.44, 0.9, 1.0, 1.37, 1.8, 2.6, 2.9, 3.05];
+    let even: Vec<f64> = (0..60).map(|k| 0.1 * f64::from(k)).collect();
+    let gap = |t: &&f64| !(2.05..3.15).contains(*t);
+    let gap: Vec<f64> = even.iter().filter(gap).copied().collect();
+    for (name, times) in [("irregular.csv", &irregular[..]), ("gap.csv", &gap)] {
+        folder.text(name, &lag_at(times));
+        let said = folder.run(&["simulate", "lag.mo", name, "--parameters", "tau=2"]);
+        let (_, simulated) = columns(&said.ok());
+        assert_eq!(simulated[0], times, "{name}");
+        for (t, y) in times.iter().zip(&simulated[1]) {
+            let expected = 1.0 - (-t / 2.0).exp();
+            assert!(
+                (y - expected).abs() < 1e-4,
+                "{name}: {y} at {t}, {expected}"
+            );
+        }
+    }
+}

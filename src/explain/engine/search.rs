@@ -345,6 +345,7 @@ pub(super) fn forward(
         let mut attempts = 0;
         let is_new = begun.is_none();
         let first_step = begun.take();
+        let mut before: Vec<Fitted> = Vec::new();
         let Step {
             mut fitted,
             strongest,
@@ -366,14 +367,14 @@ pub(super) fn forward(
                 scope,
                 trials: &asked,
             };
-            let found = step(&stage);
+            let mut found = step(&stage);
+            found.keep(std::mem::take(&mut before), &stage);
             attempts += 1;
             let again = (attempts <= BETTER_FITS).then(|| improved(&stage, &found.fitted));
             let Some(better) = again.flatten() else {
                 break found;
             };
             let lost = fit.criterion - better.criterion;
-            let mut found = found;
             let most = found.fitted.iter().map(|f| f.gain).fold(0.0, f64::max);
             match steps.last_mut().and_then(|s| s.first_mut()) {
                 None => baseline = better.clone(),
@@ -384,10 +385,11 @@ pub(super) fn forward(
             }
             fit = better;
             // All gains are less by the same amount; where that is little of the best, candidates need not be fitted again.
+            found.fitted.iter_mut().for_each(|f| f.gain -= lost);
             if lost < TIE.1 * most {
-                found.fitted.iter_mut().for_each(|f| f.gain -= lost);
                 break found;
             }
+            before = found.fitted;
         };
         if accepted_so_far == 1 && chance(strongest.0) * (strongest.1 as f64) < LEFT {
             let estimator = objective.estimator();

@@ -48,6 +48,18 @@ pub(super) struct Step {
     pub(super) map: Option<EquationMap>,
 }
 
+impl Step {
+    /// Candidates that were found from a worse fit of the plant are still there: tests at the better one may not lead to them.
+    pub(super) fn keep(&mut self, before: Vec<Fitted>, stage: &Stage) {
+        if before.is_empty() {
+            return;
+        }
+        self.fitted.extend(before);
+        self.fitted = drop_repeated(std::mem::take(&mut self.fitted));
+        order(&stage.plant.spec, &mut self.fitted, stage.needed);
+    }
+}
+
 /// The fit of the plant alone from where a candidate has led, where that is better: what the term seemed to gain was a better
 /// fit of the plant's own parameters.
 pub(super) fn improved(stage: &Stage, fitted: &[Fitted]) -> Option<Fit> {

@@ -320,6 +320,14 @@ pub(crate) const TERMS: &[Term] = &[
         "{z}*abs({z})^0.25",
         &[],
     ),
+    // ... through an opening.
+    curve(
+        "natural_convection",
+        Equation,
+        Difference,
+        "{z}*abs({z})^0.5",
+        &[],
+    ),
     curve("efficiency", Equation, Driven, "{z}", &[]),
     curve("load_constant", Equation, Time, "1.0", &[]),
     curve("load_ramp", Equation, Time, "time", &[]),

@@ -184,6 +184,10 @@ pub(crate) fn named(spec: &ModelSpec, found: &Fitted) -> &'static str {
             "load_step"
         }
         _ if feeds(spec, id, found) => "law",
+        // A cube about a place that was not passed is no spring that gets stiffer to both sides, but a curve that bends.
+        ("cubic_stiffness", Some(&rest)) if term.id == "cube" && !(from < rest && rest < to) => {
+            "law"
+        }
         // What an actuator does for having moved comes late: an input that is ahead of itself is no hysteresis.
         _ if term.id == "input_hysteresis" && found.strength() > 0.0 => "law",
         ("hysteresis", Some(&slip))

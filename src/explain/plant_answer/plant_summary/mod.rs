@@ -134,7 +134,8 @@ impl Answer<'_> {
             }
         }
         lines.extend(self.shared_terms(told.effects));
-        lines.extend(changes(told.parameters, self.origin));
+        let unproven = told.verdict == Verdict::Unexplained && !told.effects.is_empty();
+        lines.extend(changes(told.parameters, self.origin, unproven));
         // The bounds of a structure are those of physics: a spring that is not there is at one.
         let written = self.origin == Origin::Text;
         lines.extend(bounds_in_words(&bounds.determined, told).filter(|_| written));
@@ -233,7 +234,7 @@ fn closest(effect: &EffectFound) -> String {
 }
 
 /// Parameters that differ from the text, or all of a structure.
-fn changes(parameters: &[ParameterChange], origin: Origin) -> Option<String> {
+fn changes(parameters: &[ParameterChange], origin: Origin, unproven: bool) -> Option<String> {
     let each: Vec<String> = parameters
         .iter()
         .map(|p| {
@@ -249,9 +250,10 @@ fn changes(parameters: &[ParameterChange], origin: Origin) -> Option<String> {
             }
         })
         .collect();
-    let which = match origin {
-        Origin::Text => "Parameters that differ from the text",
-        Origin::Structure => "Parameters of the equations",
+    let which = match (origin, unproven) {
+        (Origin::Text, false) => "Parameters that differ from the text",
+        (Origin::Text, true) => "With this candidate, parameters that differ from the text",
+        (Origin::Structure, _) => "Parameters of the equations",
     };
     (!each.is_empty()).then(|| format!("{which}: {}.", each.join("; ")))
 }

@@ -329,7 +329,7 @@ pub const PLANT_EFFECTS: &[PlantEffect] = &[
     effect(
         "natural_convection",
         "convection that grows with the temperature difference",
-        "C*der(T) = ... + c*(T - Ta)*abs(T - Ta)^0.25",
+        "C*der(T) = ... + c*(T - Ta)*abs(T - Ta)^0.25; through an opening ^0.5",
         ANY_EQUATION,
         "the difference of two temperatures",
         &[
