@@ -6,6 +6,17 @@ use rand_chacha::ChaCha8Rng;
 use super::{Direction, Excitation, Hold, Plant};
 use crate::physics::parse;
 
+/// One input, held from sample to sample.
+fn held<'a>(inputs: &'a [&'a [f64]], sample_time: f64) -> Excitation<'a> {
+    Excitation {
+        inputs,
+        length: inputs[0].len(),
+        sample_time,
+        start_time: 0.0,
+        hold: Hold::Zero,
+    }
+}
+
 #[test]
 fn sensitivities_stay_bounded_where_friction_holds() {
     let text = "model M parameter Real J = 0.02; parameter Real d = 0.05; parameter Real c = 0.3; input Real u; output Real y;
@@ -24,13 +35,8 @@ fn sensitivities_stay_bounded_where_friction_holds() {
                 push + 0.1 * (random.random::<f64>() - 0.5)
             })
             .collect();
-        let excitation = Excitation {
-            inputs: &[&u],
-            length: u.len(),
-            sample_time: 0.02,
-            start_time: 0.0,
-            hold: Hold::Zero,
-        };
+        let inputs: [&[f64]; 1] = [&u];
+        let excitation = held(&inputs, 0.02);
         let point = plant.nominal();
         let run = plant.simulate(&point, &excitation, None).expect("a run");
         let slopes = plant.sensitivities(&point, &excitation, None, &run.plan, &directions);
@@ -50,13 +56,8 @@ fn modes_at_rest_limit_the_step() {
          equation der(x) = u - x; der(z) = p - 400*z*(1 + x^2); y = x + z; end R;";
     let plant = Plant::new(parse(text).expect("a plant"));
     let u: Vec<f64> = (0..400).map(|k| f64::from(u8::from(k % 40 < 20))).collect();
-    let excitation = Excitation {
-        inputs: &[&u],
-        length: u.len(),
-        sample_time: 0.02,
-        start_time: 0.0,
-        hold: Hold::Zero,
-    };
+    let inputs: [&[f64]; 1] = [&u];
+    let excitation = held(&inputs, 0.02);
     let (point, directions) = (plant.nominal(), [Direction::Parameter(0)]);
     let run = plant.simulate(&point, &excitation, None).expect("a run");
     let slopes = plant.sensitivities(&point, &excitation, None, &run.plan, &directions);
@@ -103,14 +104,9 @@ fn states_of_any_size_are_no_divergence_and_have_scales_of_their_own() {
         (rest[0] - 21.0).abs() < 1e-6 && (rest[1] - 3e9).abs() < 1.0,
         "{rest:?}"
     );
-    let inputs = [0.5; 400];
-    let excitation = Excitation {
-        inputs: &[&inputs],
-        length: 400,
-        sample_time: 2.0,
-        start_time: 0.0,
-        hold: Hold::Zero,
-    };
+    let flow = [0.5; 400];
+    let inputs: [&[f64]; 1] = [&flow];
+    let excitation = held(&inputs, 2.0);
     let run = plant.simulate(&point, &excitation, None).expect("a run");
     assert!((run.outputs[0][399] - 21.0).abs() < 1e-6);
 }
@@ -127,13 +123,8 @@ fn what_a_valve_was_at_the_sample_before_is_exact() {
     let u: Vec<f64> = (0..300)
         .map(|k| (0.07 * f64::from(k)).sin() + 0.4 * (0.31 * f64::from(k)).cos())
         .collect();
-    let excitation = Excitation {
-        inputs: &[&u],
-        length: u.len(),
-        sample_time: 0.1,
-        start_time: 0.0,
-        hold: Hold::Zero,
-    };
+    let inputs: [&[f64]; 1] = [&u];
+    let excitation = held(&inputs, 0.1);
     let point = plant.nominal();
     let run = plant.simulate(&point, &excitation, None).expect("a run");
     let (mut p, mut q, mut h) = (0.1f64, 0.15f64, 0.4f64);
@@ -169,4 +160,32 @@ fn what_a_valve_was_at_the_sample_before_is_exact() {
         let linear = lineariser.at(&[run.states[0][k]], &[u], excitation.time(k));
         assert_eq!(linear.output[1], run.outputs[1][k], "sample {k}");
     }
+}
+
+#[test]
+fn work_is_counted_alike_at_each_run_and_with_what_counts_together() {
+    let text = "model V parameter Real d = 0.3; input Real u; output Real y; Real v(start=1);
+         equation der(v) = u - d*v*abs(v); y = v; end V;";
+    let plant = Plant::new(parse(text).expect("a plant"));
+    let input = [1.0; 200];
+    let inputs: [&[f64]; 1] = [&input];
+    let excitation = held(&inputs, 0.1);
+    let point = plant.nominal();
+    assert_eq!(plant.work(), 0);
+    let run = plant.simulate(&point, &excitation, None).expect("a run");
+    let one = plant.work();
+    assert!(one >= 200, "{one}");
+    let other = Plant::new(plant.spec.clone()).counting_with(&plant);
+    other.simulate(&point, &excitation, None).expect("a run");
+    assert_eq!(plant.work(), 2 * one);
+    // Sensitivities are as many numbers for each value.
+    plant.sensitivities(
+        &point,
+        &excitation,
+        None,
+        &run.plan,
+        &[Direction::Parameter(0)],
+    );
+    assert!(plant.work() > 3 * one, "{} {one}", plant.work());
+    assert_eq!(plant.clone().counting().work(), 0);
 }
