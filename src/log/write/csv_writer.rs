@@ -166,7 +166,7 @@ impl CsvWriter {
             let since = self
                 .rate
                 .map_or(sample * self.sample_time, |rate| sample / rate);
-            let given = (self.times.as_ref()).and_then(|times| times.get(self.samples as usize));
+            let given = (self.times.as_ref()).and_then(|times| times.get(self.samples));
             let time = given.copied().unwrap_or(self.start_time + since);
             write_number(&mut self.output, time)?;
             for column in columns {

@@ -452,9 +452,17 @@ impl Plant {
         self.check(excitation)?;
         let mut integrator = self.integrator::<0>(point, excitation, widths.unwrap_or(&[]), &[]);
         let mut control = StepControl::new(self, &integrator, widths.is_none(), most_steps);
-        let run = self.run_with(&mut integrator, &mut control, excitation, observer);
+        let [mut outputs, mut states] = [&self.tape.outputs, &self.tape.states]
+            .map(|of| vec![Vec::with_capacity(excitation.length); of.len()]);
+        let columns = [&mut outputs, &mut states];
+        let run = self.run_with(
+            &mut integrator,
+            &mut control,
+            (excitation, observer),
+            columns,
+        );
         self.count(control.attempts() + excitation.length, 1);
-        let (outputs, states) = run?;
+        run?;
         Ok(Trajectory {
             outputs,
             states,
@@ -462,17 +470,14 @@ impl Plant {
         })
     }
 
-    /// Outputs and states at every sample.
+    /// Appends outputs and states at every sample.
     fn run_with(
         &self,
         integrator: &mut Integrator<0>,
         control: &mut StepControl,
-        excitation: &Excitation,
-        observer: Option<&Observer>,
-    ) -> Result<(Vec<Vec<f64>>, Vec<Vec<f64>>), SimulationError> {
-        let column = || Vec::with_capacity(excitation.length);
-        let mut outputs: Vec<Vec<f64>> = self.tape.outputs.iter().map(|_| column()).collect();
-        let mut states: Vec<Vec<f64>> = self.tape.states.iter().map(|_| column()).collect();
+        (excitation, observer): (&Excitation, Option<&Observer>),
+        [outputs, states]: [&mut Vec<Vec<f64>>; 2],
+    ) -> Result<(), SimulationError> {
         let limits: Vec<f64> = (integrator.x.iter())
             .map(|x| DIVERGED * x.value.abs().max(1.0))
             .collect();
@@ -497,7 +502,7 @@ impl Plant {
                 self.bounded(integrator, &limits, excitation.time(k + 1))?;
             }
         }
-        Ok((outputs, states))
+        Ok(())
     }
 
     /// Whether no state has diverged.
