@@ -67,5 +67,4 @@ pub(crate) use time::Origin;
 pub(crate) use time::counted;
 #[cfg(feature = "cli")]
 pub(crate) use write::write_file_atomically;
-pub(crate) use write::write_simulation;
-pub use write::{CsvWriter, write_table};
+pub use write::{CsvWriter, write_simulation, write_table};

@@ -238,11 +238,12 @@ pub fn write_table(
     writer.finish()
 }
 
-/// Writes a simulation; where it lies on another grid than the rows of its input, with a row for each of those, at its time.
+/// Writes a simulation on a grid (sample time and time of the first sample, in seconds); where that is another than the rows of its
+/// input ([`Reading::rows`](super::super::Reading::rows), seconds), with a row for each of those, at its time: on a line between samples.
 ///
 /// # Errors
 /// As those of [`write_table`].
-pub(crate) fn write_simulation(
+pub fn write_simulation(
     path: &Path,
     (sample_time, start_time): (f64, f64),
     rows: Option<&[f64]>,

@@ -4,5 +4,4 @@ mod atomic;
 mod csv_writer;
 
 pub use atomic::write_file_atomically;
-pub(crate) use csv_writer::write_simulation;
-pub use csv_writer::{CsvWriter, write_table};
+pub use csv_writer::{CsvWriter, write_simulation, write_table};
