@@ -16,6 +16,8 @@ pub(crate) const EXPLAINED: f64 = 0.5;
 /// A run that takes this part off the variance of a recording is a very good one (D. N. Moriasi et al., *Trans. ASABE* 50, 2007,
 /// Table 4: Nash-Sutcliffe efficiency above 0.75).
 const VERY_GOOD: f64 = 0.75;
+/// A free run that leaves less of the variance than this, a fit of 90 %, is close.
+pub(super) const CLOSE: f64 = 0.01;
 /// One that does not take more than this part off is unsatisfactory (the same).
 pub(crate) const SATISFACTORY: f64 = 0.5;
 /// Level of the test that errors are smaller than others.
@@ -103,6 +105,11 @@ impl HeldOut {
     /// Whether free runs follow the recordings so closely that what they leave is of little weight.
     pub(crate) fn follows_closely(&self) -> bool {
         ratio(&self.squares, &self.variances).powi(2) <= 1.0 - VERY_GOOD && self.stays()
+    }
+
+    /// Whether free runs leave next to nothing of the recordings.
+    pub(crate) fn is_close(&self) -> bool {
+        ratio(&self.squares, &self.variances).powi(2) <= CLOSE && self.stays()
     }
 
     /// Whether free runs stay near the recordings in every output, even if they do not follow them: those of an unstable plant

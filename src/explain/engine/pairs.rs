@@ -2,7 +2,7 @@
 
 use super::fitting::edit::Place;
 use super::fitting::fitted::{Fitted, TIE, tie_with_curve};
-use super::holdout::held_out;
+use super::holdout::{CLOSE, held_out};
 use super::search::{Found, HALF_WAY, Question, forward};
 use super::step::Step;
 use super::terms::documentation::PLANT_EFFECTS;
@@ -14,9 +14,6 @@ use crate::physics::estimate::{EstimateError, Fit, Study};
 const OTHER_FIRSTS: usize = 4;
 /// ... and in place of a law.
 const FIRSTS_OF_A_LAW: usize = 2;
-
-/// A free run that leaves less of the variance than this, a fit of 90 %, is close.
-const CLOSE: f64 = 0.01;
 
 /// What the equations leave out. The fit of the plant alone may be known.
 ///

@@ -209,6 +209,10 @@ impl Answer<'_> {
             .enumerate()
             .filter_map(|(i, fitted)| self.effect(i, fitted))
             .collect();
+        let in_time = |f: &Fitted| f.lead.term.needs == Needs::Time && f.lead.term.id != "periodic";
+        // A change at an instant that leaves structure may stand for several, unless it leaves next to nothing of the free run.
+        let close = (self.found.held_out.as_ref()).is_none_or(|[_, with]| with.is_close());
+        let single = p_value >= LEFT || close || !self.effects().any(in_time);
         // A name must take half of the mean square off blocks left out, or more off them than chance does. Where much structure is left,
         // it is given only to what does the first, and leaves little: a curve may follow what enters elsewhere; a term with a name of
         // its own claims more.
@@ -220,6 +224,7 @@ impl Answer<'_> {
             && self.effects().all(|fitted| self.is_significant(fitted))
             && self.effects().all(|fitted| self.doubt(fitted).is_none())
             && better
+            && single
             && (adequate || explains && !curves);
         let runs = self.free_runs();
         let l = self.base.outputs();
@@ -309,7 +314,6 @@ impl Answer<'_> {
         });
         // What is not sure predicts a fresh recording only where it makes blocks left out better, as a name must. Blocks between others
         // say nothing of what a load or a parameter does later.
-        let in_time = |f: &Fitted| f.lead.term.needs == Needs::Time && f.lead.term.id != "periodic";
         let later = self.effects().any(in_time);
         let doubted = self.effects().any(|fitted| self.doubt(fitted).is_some());
         let safe = self.effects().enumerate().all(|(i, fitted)| {

@@ -49,9 +49,10 @@ pub(super) struct Step {
 }
 
 impl Step {
-    /// Candidates that were found from a worse fit of the plant are still there: tests at the better one may not lead to them.
+    /// Candidates that were found from a worse fit of the plant are still there: tests at the better one may not lead to them. Beside an
+    /// effect, what tests at the better fit do not show would make up for what is missing elsewhere.
     pub(super) fn keep(&mut self, before: Vec<Fitted>, stage: &Stage) {
-        if before.is_empty() {
+        if before.is_empty() || stage.accepted > 0 {
             return;
         }
         self.fitted.extend(before);
