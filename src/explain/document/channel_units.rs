@@ -24,6 +24,23 @@ const POSITIONS: &[&str] = &[
     "\u{b0}", "degree", "degrees", "grad",
 ];
 
+/// Words of names that say what a channel without a unit is.
+const RATE_WORDS: &[&str] = &[
+    "speed", "velocity", "vel", "omega", "rate", "flow", "gyro", "rpm",
+];
+const POSITION_WORDS: &[&str] = &[
+    "position",
+    "pos",
+    "angle",
+    "displacement",
+    "disp",
+    "deflection",
+    "travel",
+    "stroke",
+    "altitude",
+    "theta",
+];
+
 /// The unit of a channel in lower case: of its brackets, else what the name ends with behind an underscore.
 fn written(channel: &Channel) -> Option<String> {
     let unit = channel.unit.clone();
@@ -46,16 +63,28 @@ pub(crate) fn is_in(channel: &Channel, unit: &str) -> bool {
     })
 }
 
+/// Whether a channel without a unit in brackets has one of these words in its name.
+fn is_called(channel: &Channel, words: &[&str]) -> bool {
+    let name = channel.name.to_lowercase();
+    let mut parts = name.split(|c: char| !c.is_alphabetic());
+    channel.unit.is_none() && parts.any(|part| words.contains(&part))
+}
+
 /// Whether `channel` is a speed or a flow.
 pub(crate) fn is_rate(channel: &Channel) -> bool {
-    written(channel).is_some_and(|written| {
+    let by_unit = written(channel).is_some_and(|written| {
         let by_time = |(_, time): (&str, &str)| BY_TIME.contains(&time);
         RATES.contains(&written.as_str()) || written.rsplit_once('/').is_some_and(by_time)
-    })
+    });
+    by_unit || !has_unit_of_position(channel) && is_called(channel, RATE_WORDS)
 }
 
 /// Whether `channel` is a position or an angle.
 pub(crate) fn is_position(channel: &Channel) -> bool {
+    has_unit_of_position(channel) || !is_rate(channel) && is_called(channel, POSITION_WORDS)
+}
+
+fn has_unit_of_position(channel: &Channel) -> bool {
     written(channel).is_some_and(|written| POSITIONS.contains(&written.as_str()))
 }
 
@@ -82,6 +111,9 @@ mod tests {
         assert!(is_rate(&channel("speed", Some("RPM"))));
         assert!(is_rate(&channel("flow", Some("m3/h"))) && is_rate(&channel("q", Some("l/min"))));
         assert!(!is_rate(&channel("disp_mm", None)));
+        assert!(is_rate(&channel("speed", None)) && is_rate(&channel("Motor Speed", None)));
+        assert!(!is_rate(&channel("speed", Some("V"))) && !is_rate(&channel("pos_rate_mm", None)));
+        assert!(is_position(&channel("shaft_angle", None)));
         assert!(is_position(&channel("disp_mm", None)));
         assert!(is_position(&channel("angle", Some("Deg"))));
         assert!(!is_position(&channel("T", Some("K"))) && !is_position(&channel("y", None)));

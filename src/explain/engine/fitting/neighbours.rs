@@ -9,7 +9,7 @@ use crate::explain::engine::hypothesis::Ground;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::TERMS;
-use crate::explain::engine::terms::names::called;
+use crate::explain::engine::terms::names::{called, named, special_case};
 use crate::explain::engine::terms::richer::richer;
 use crate::explain::engine::terms::term::{Needs, Port, Term, curve};
 use crate::explain::engine::terms::values::{grid, starts};
@@ -89,6 +89,33 @@ pub(in crate::explain::engine) fn of_one_variable(
         )
     });
     clearly_better(fitted, glanced, ground)
+}
+
+/// The special case of a fit's term that has a name too, from the values of the fit, where it gains as much: a screen may have found only
+/// the richer form from where it starts.
+pub(in crate::explain::engine) fn simpler_form(
+    fitted: &Fitted,
+    arguments: &[Argument],
+    ground: &Ground,
+) -> Option<Fitted> {
+    let (spec, lead) = (&ground.plant.spec, &fitted.lead);
+    let wanted = special_case(named(spec, fitted))?;
+    let variables = &arguments[lead.argument?].variables;
+    let symbols = |term: &Term| term.shapes.iter().map(|s| s.symbol).collect::<Vec<_>>();
+    let own = symbols(lead.term);
+    let special = |t: &&Term| {
+        let fewer = symbols(t);
+        let is_part = fewer.len() < own.len() && own.starts_with(&fewer);
+        is_part && called(spec, t, lead.place, variables) == wanted
+    };
+    let fits = TERMS.iter().filter(special).filter_map(|term| {
+        let start = (&fitted.shapes[..term.shapes.len()], fitted.strength());
+        let what = (term, lead.argument);
+        let glanced = in_its_place(fitted, what, start, &glance, arguments, ground)?;
+        thoroughly(glanced, ground)
+    });
+    let best = fits.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+    (best.gain >= fitted.gain && best.is_resolved(ground.study)).then_some(best)
 }
 
 /// Parts of what leaves one equation that start as what arrives in another.

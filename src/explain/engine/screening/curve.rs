@@ -112,12 +112,20 @@ fn characteristics(
         let is_own = |a: &Argument| {
             let mut variables = a.variables.clone();
             variables.sort_unstable();
-            let form = matches!(a.form, ArgumentForm::Variable | ArgumentForm::Difference);
+            let form = is_of_curves(a.form);
             form && variables == own
         };
         Some((*place, arguments.iter().position(is_own)?))
     };
     places.iter().filter_map(of).take(CHARACTERISTICS).collect()
+}
+
+/// Whether a curve of such an argument is one of a quantity, not of what was made of several for one law.
+fn is_of_curves(form: ArgumentForm) -> bool {
+    matches!(
+        form,
+        ArgumentForm::Variable | ArgumentForm::Difference | ArgumentForm::Sum
+    )
 }
 
 /// Curves at the places and of the arguments of the best terms, and of the plant's own characteristics.
@@ -138,7 +146,7 @@ pub(in crate::explain::engine) fn curves(
                 continue;
             };
             let form = arguments[argument].form;
-            let of_one = matches!(form, ArgumentForm::Variable | ArgumentForm::Difference);
+            let of_one = is_of_curves(form);
             let of_one = of_one
                 && match lead.place {
                     Place::Parameter(p) => {

@@ -7,7 +7,7 @@ use crate::explain::engine::fitting::fitted::{Fitted, TIE};
 use crate::explain::engine::fitting::formulas::formulas;
 use crate::explain::engine::fitting::neighbours::{
     also_elsewhere, as_parameter_changes, as_plain_functions, named_elsewhere, of_one_variable,
-    richer_form,
+    richer_form, simpler_form,
 };
 use crate::explain::engine::fitting::refined_curve::refined_curve;
 use crate::explain::engine::hypothesis::Ground;
@@ -61,6 +61,9 @@ pub(super) fn add_neighbours(
         let of_one = || of_one_variable(one, arguments, ground);
         if let Some(better) = richer.or_else(|| close.then(of_one).flatten()) {
             *one = better;
+        }
+        if let Some(simpler) = simpler_form(one, arguments, ground) {
+            *one = simpler;
         }
         if let Some(better) = also_elsewhere(one, stage.given, arguments, ground) {
             *one = better;

@@ -20,6 +20,8 @@ pub(crate) enum ArgumentForm {
     Difference,
     /// A difference of a variable and a number or parameter that stands in the text.
     FromReference,
+    /// A weighted sum of variables that stands in the text, such as how fast a strut on a turning body is compressed.
+    Sum,
     Product,
     /// The difference of the fourth powers of two absolute temperatures in 100 K.
     Radiation,
@@ -403,7 +405,108 @@ fn affine(spec: &ModelSpec, id: ExpressionId) -> Option<Option<VariableId>> {
     }
 }
 
-/// Variables of the plant that something may depend on, differences of two of one unit, and products of states and inputs.
+/// Variables of an expression that is their weighted sum, with weights and a constant made of parameters and numbers.
+fn summed(spec: &ModelSpec, id: ExpressionId) -> Option<Vec<VariableId>> {
+    let both = |a, b| {
+        let (mut all, more) = (summed(spec, a)?, summed(spec, b)?);
+        all.extend(more);
+        Some(all)
+    };
+    match spec.expressions.node(id) {
+        Node::Number(_) => Some(vec![]),
+        Node::Variable(v) => match spec.variable(v).kind {
+            VariableKind::Parameter | VariableKind::Constant => Some(vec![]),
+            _ => Some(vec![v]),
+        },
+        Node::Negate(a) => summed(spec, a),
+        Node::Binary(Binary::Add | Binary::Subtract, a, b) => both(a, b),
+        Node::Binary(Binary::Multiply, a, b) => {
+            both(a, b).filter(|_| is_fixed(spec, a) || is_fixed(spec, b))
+        }
+        Node::Binary(Binary::Divide, a, b) => summed(spec, a).filter(|_| is_fixed(spec, b)),
+        _ => None,
+    }
+}
+
+/// Whether an expression is made of parameters and numbers alone.
+fn is_fixed(spec: &ModelSpec, id: ExpressionId) -> bool {
+    summed(spec, id).is_some_and(|variables| variables.is_empty())
+}
+
+fn text_of(spec: &ModelSpec, id: ExpressionId) -> &str {
+    let span = spec.expressions.span(id);
+    spec.text.get(span.start..span.end).unwrap_or_default()
+}
+
+/// The derivative of a weighted sum, where the plant has variables for those of its terms.
+fn rate_of_sum(spec: &ModelSpec, id: ExpressionId) -> Option<String> {
+    let of = |id| rate_of_sum(spec, id);
+    match spec.expressions.node(id) {
+        _ if is_fixed(spec, id) => Some("0.0".to_owned()),
+        Node::Variable(v) => rate(spec, &[v]),
+        Node::Negate(a) => Some(format!("(-{})", of(a)?)),
+        Node::Binary(Binary::Add, a, b) => Some(format!("({} + {})", of(a)?, of(b)?)),
+        Node::Binary(Binary::Subtract, a, b) => Some(format!("({} - {})", of(a)?, of(b)?)),
+        Node::Binary(Binary::Multiply, a, b) if is_fixed(spec, a) => {
+            Some(format!("({})*{}", text_of(spec, a), of(b)?))
+        }
+        Node::Binary(Binary::Multiply, a, b) => Some(format!("{}*({})", of(a)?, text_of(spec, b))),
+        Node::Binary(Binary::Divide, a, b) => Some(format!("{}/({})", of(a)?, text_of(spec, b))),
+        _ => None,
+    }
+}
+
+/// Weighted sums of two and more variables that are factors, divisors or arguments of functions in the text, and are no variable and no
+/// plain difference.
+fn sums(spec: &ModelSpec, variables: &[VariableId]) -> Vec<Argument> {
+    let node = |id: ExpressionId| spec.expressions.node(id);
+    let is_sum =
+        |id: ExpressionId| matches!(node(id), Node::Binary(Binary::Add | Binary::Subtract, ..));
+    let is_declared = |text: &str| {
+        let own = |e: &Equation| matches!(e.unknown, Unknown::Value(_)) && e.coefficient.is_none();
+        let declared = |e: &&Equation| own(e) && text_of(spec, e.rest) == text;
+        spec.equations.iter().any(|e| declared(&e))
+    };
+    let mut found: Vec<Argument> = Vec::new();
+    for whole in spec.expressions.nodes() {
+        if matches!(whole, Node::Binary(Binary::Add | Binary::Subtract, ..)) {
+            continue;
+        }
+        for part in whole.operands().filter(|&part| is_sum(part)) {
+            let Some(mut of) = summed(spec, part) else {
+                continue;
+            };
+            of.sort();
+            of.dedup();
+            let is_difference = match node(part) {
+                Node::Binary(Binary::Subtract, a, b) => [a, b]
+                    .iter()
+                    .all(|&side| matches!(node(side), Node::Variable(v) if of.contains(&v))),
+                _ => false,
+            };
+            let text = text_of(spec, part);
+            let named = |v: &VariableId| text.contains(&spec.variable(*v).name);
+            let is_new = of.len() > 1
+                && !is_difference
+                && of.iter().all(|v| variables.contains(v) && named(v))
+                && !is_declared(text)
+                && !found
+                    .iter()
+                    .any(|f| f.expression[1..f.expression.len() - 1] == *text);
+            if is_new {
+                let mut sum = Argument::new(spec, format!("({text})"), of);
+                sum.form = ArgumentForm::Sum;
+                sum.is_difference = true;
+                sum.rate = rate_of_sum(spec, part);
+                found.push(sum);
+            }
+        }
+    }
+    found
+}
+
+/// Variables of the plant that something may depend on, differences of two of one unit, weighted sums that stand in the text, and products
+/// of states and inputs.
 pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
     let name = |v: VariableId| spec.variable(v).name.clone();
     let simple: Vec<VariableId> = [
@@ -453,6 +556,7 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
     }
     found.extend(driven(spec, &simple));
     found.extend(from_references(spec, &simple));
+    found.extend(sums(spec, &simple));
     // Bodies radiate to each other, and each to a room.
     let fourth = |v: VariableId| match spec.variable(v).unit_text.as_deref() {
         Some("K") => Some(format!("({}/100)^4", name(v))),
@@ -539,6 +643,25 @@ mod tests {
         let about_zero = vec![-3.0, -0.001, 3.0];
         let usual = with_values([about_zero.clone(), about_zero]).usual();
         assert_eq!(usual.to_string(), "0");
+    }
+
+    #[test]
+    fn weighted_sums_of_the_text_are_arguments_with_a_rate() {
+        let spec = parse(
+            "model Body parameter Real b = 1.4; parameter Real k = 20; parameter Real d = 2; input Real F; input Real r;
+             output Real y; Real z; Real v; Real q; Real w; Real f; Real e;
+             equation der(z) = v; der(q) = w; f = k*(z + b*q) + d*(v + b*w); e = z - 2*q;
+             der(v) = F - f + d*(z - 2*q) + d*(r - z); der(w) = -b*f; y = z;
+             end Body;",
+        )
+        .unwrap();
+        let all = arguments(&spec);
+        let sums = all.iter().filter(|a| a.form == ArgumentForm::Sum);
+        let found: Vec<(&str, Option<&str>)> = sums
+            .map(|a| (a.expression.as_str(), a.rate.as_deref()))
+            .collect();
+        let expected = [("(z + b*q)", Some("(v + (b)*w)")), ("(v + b*w)", None)];
+        assert_eq!(found, expected);
     }
 
     #[test]

@@ -133,7 +133,11 @@ fn flows(unit: &str) -> bool {
 
 /// Whether a state with this unit is what flows, not what is stored: a current, a flow with inertia.
 fn is_current(unit: &str) -> bool {
-    matches!(unit, "A" | "mA") || unit.ends_with("/s")
+    matches!(unit, "A" | "mA") || is_flow(unit)
+}
+
+fn is_flow(unit: &str) -> bool {
+    ["/s", "/min", "/h"].iter().any(|time| unit.ends_with(time))
 }
 
 /// Whether the square of a quantity with this unit may be a heat: a current, a voltage, or what has no unit.
@@ -344,6 +348,10 @@ pub(crate) fn called(
             _ => "law",
         },
         (Port::Equation, "signed_square") if what == Kind::Velocity => "quadratic_drag",
+        // Turbulent losses of a pipe, in the equation of what flows through it.
+        (Port::Equation, "signed_square") if *variables == [own] && is_flow(unit_of_place) => {
+            "quadratic_drag"
+        }
         (Port::Equation, "cube") => match what {
             Kind::Velocity => "cubic_drag",
             Kind::Position => "cubic_stiffness",
@@ -555,6 +563,8 @@ mod tests {
                     equation der(w) = i - w; der(i) = u - i; y = w; end M;";
         assert_eq!(name(bare, "signed_square", "w", "w"), "quadratic_drag");
         assert_eq!(name(bare, "friction", "w", "w"), "coulomb_friction");
+        let pipe = bare.replace("Real w;", "Real w(unit=\"m3/s\");");
+        assert_eq!(name(&pipe, "signed_square", "w", "w"), "quadratic_drag");
         // Not what another state does, and not what has a unit that is none of a velocity.
         assert_eq!(name(bare, "signed_square", "w", "i"), "law");
         let warm = bare.replace("Real w;", "Real w(unit=\"K\");");

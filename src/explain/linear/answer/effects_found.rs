@@ -148,7 +148,7 @@ impl Answer<'_> {
                 effect_found.effect = "law".to_owned();
                 effect_found.depends = vec![output.name.clone()];
                 effect_found.sentence = format!(
-                    "A function of {0} acts where the input does: {1}. The slowest mode of the plant does not oscillate, and {0} has no unit of a position or a rate: \
+                    "A function of {0} acts where the input does: {1}. The slowest mode of the plant does not oscillate, and neither a unit nor the name says that {0} is a position or a rate: \
                      a spring, a loss and an outflow look alike.",
                     output.name, definition.equation
                 );
