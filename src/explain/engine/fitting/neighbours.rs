@@ -7,7 +7,7 @@ use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
 use crate::explain::engine::fitting::formulas::{in_its_place, instead};
 use crate::explain::engine::hypothesis::Ground;
 use crate::explain::engine::screening::screen::Lead;
-use crate::explain::engine::terms::argument::Argument;
+use crate::explain::engine::terms::argument::{Argument, ArgumentForm};
 use crate::explain::engine::terms::library::TERMS;
 use crate::explain::engine::terms::names::{called, named, special_case};
 use crate::explain::engine::terms::richer::richer;
@@ -38,7 +38,9 @@ fn with_one_shape_more(fitted: &Fitted, arguments: &[Argument], ground: &Ground)
             .map(|start| (term, start))
             .collect()
     };
-    let each: Vec<(&Term, f64)> = richer(fitted.lead.term).flat_map(begun).collect();
+    let is_product = argument.is_some_and(|a| a.form == ArgumentForm::Product);
+    let forms = richer(fitted.lead.term).filter(|term| is_product || !term.is_of_product());
+    let each: Vec<(&Term, f64)> = forms.flat_map(begun).collect();
     let glanced = each.into_par_iter().filter_map(|(term, start)| {
         let shapes = [&fitted.shapes[..], &[start]].concat();
         let strength = match term.free_strength {

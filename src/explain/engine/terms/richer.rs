@@ -10,8 +10,8 @@ use super::term::{Memory, MemoryStart, Shape, Starts, Term, curve, in_place, sam
 
 /// The forms of a term with one shape more: a contact has damping in proportion to its depth (K. H. Hunt and F. R. E. Crossley,
 /// *J. Appl. Mech.* 42, 1975), a flow over a crest a power of its height (3/2 over a weir), and an actuator with play, stiction or
-/// hysteresis a lag; the two sides of limits and dead zones differ, a limit has a soft knee, a ramp begins later than the recording, and a
-/// change takes time. They keep the name.
+/// hysteresis a lag; a product counts from a reference, the two sides of limits and dead zones differ, a limit has a soft knee, a ramp
+/// begins later than the recording, and a change takes time. They keep the name.
 pub(in crate::explain::engine) fn richer(term: &Term) -> impl Iterator<Item = &'static Term> {
     let shapes = term.shapes;
     let is_next = move |richer: &&Term| {
@@ -24,6 +24,7 @@ pub(in crate::explain::engine) fn richer(term: &Term) -> impl Iterator<Item = &'
 /// Those of a form and of its richer ones.
 fn all_richer(term: &Term) -> &'static [Term] {
     match (term.id, term.shapes) {
+        ("linear", _) => ABOUT_REFERENCES,
         ("above", _) => ABOVE_MORE,
         ("below", _) => BELOW_MORE,
         ("both_sides", _) => BOTH_SIDES_MORE,
@@ -60,6 +61,25 @@ const BEGIN: Shape = shape("t0", Starts::Instants(&[0.1, 0.3, 0.5, 0.7]), false)
 /// How long a change takes.
 const DURATION: Shape = shape("T", Starts::Length(&[0.02, 0.1, 0.3]), true);
 
+/// Where a product is zero: from the fit of the plain product the search finds it.
+const REFERENCE: Shape = shape("o", Starts::Values(&[0.0]), false);
+/// Of a product: what a temperature does to a power counts from a temperature of its own.
+const ABOUT_REFERENCES: &[Term] = &[
+    curve(
+        "linear",
+        Equation,
+        Anything,
+        "{z} - {o}*{second}",
+        &[REFERENCE],
+    ),
+    curve(
+        "linear",
+        Equation,
+        Anything,
+        "{z} - {o}*{first}",
+        &[REFERENCE],
+    ),
+];
 const ABOVE_MORE: &[Term] = &[
     curve(
         "above",
@@ -285,11 +305,12 @@ mod tests {
             let name = format!("{{{}}}", last.symbol);
             let remembers = richer.memories.iter().any(|m| m.rate.contains(&name));
             assert!(richer.form.contains(&name) || remembers, "{}", simple.id);
+            assert!(!richer.is_of_product() || simple.id == "linear");
             let of = |t: &Term| (t.id, t.port, t.needs, t.free_strength, t.symbol);
             assert_eq!(of(richer), of(simple));
             count += 1;
         }
-        assert_eq!(count, 31);
+        assert_eq!(count, 33);
         let ramp = TERMS.iter().find(|t| t.id == "parameter_ramp").unwrap();
         let late = richer(ramp).find(|t| t.shapes == [BEGIN]).unwrap();
         assert_eq!(richer(late).count(), 2);

@@ -178,6 +178,13 @@ impl Term {
     pub(crate) fn remembers_way(&self) -> bool {
         self.memories.iter().any(|m| m.sampled)
     }
+
+    /// Whether it is a function of the factors of a product.
+    pub(crate) fn is_of_product(&self) -> bool {
+        ["{first}", "{second}"]
+            .iter()
+            .any(|factor| self.form.contains(factor))
+    }
 }
 
 pub(in crate::explain::engine) const fn shape(

@@ -117,7 +117,7 @@ pub(in crate::explain::engine) fn grid(
     all
 }
 
-/// The form with its names filled in.
+/// The form with its names filled in; factors are those of a product of two variables.
 pub(crate) fn filled(
     form: &str,
     term: &Term,
@@ -126,8 +126,11 @@ pub(crate) fn filled(
     shapes: &[String],
     (begin, sample_time): (f64, f64),
 ) -> String {
+    let (first, second) = argument.split_once('*').unwrap_or((argument, argument));
     let mut text = form
         .replace("{z}", argument)
+        .replace("{first}", first)
+        .replace("{second}", second)
         .replace("{begin}", &format!("({})", literal(begin)))
         .replace("{fast}", &literal(FAST / sample_time))
         .replace("{instant}", &literal(sample_time / FAST));
