@@ -1,5 +1,6 @@
 //! Which of two explanations of simulated columns is given, and what is taken back where the simulator is not understood.
 
+use super::engine::select::CHANCE;
 use super::explanation::{Explanation, SignalTraces, Verdict};
 use super::linear::answer::probability::UNLIKELY;
 use crate::noise::{Colours, Mask, Noise, effective_samples, kept, sum_of_squares};
@@ -46,7 +47,8 @@ pub(crate) fn is_doubtful(explanation: &Explanation) -> bool {
         || match explanation.verdict {
             Verdict::Unexplained => true,
             Verdict::Named | Verdict::Family => removed(explanation) < needed(explanation),
-            Verdict::Consistent | Verdict::Parameters => false,
+            // A noise model may have taken up what is missing.
+            Verdict::Consistent | Verdict::Parameters => leaves_slow_error(explanation),
         }
 }
 
@@ -109,13 +111,18 @@ pub(crate) fn replaces(equations: &Explanation, other: &Explanation) -> bool {
 }
 
 /// Takes back what is not sure of a doubtful explanation: where it leaves structure, what it says, and where it leaves none, but
-/// explains less than noise does, that anything is missing.
+/// explains less than noise does, that anything is missing. Of little structure beside little that was explained the same holds: no linear
+/// model of the difference follows other parameters of a simulator that is not linear.
 pub(crate) fn doubt(explanation: &mut Explanation) {
-    if !matches!(explanation.verdict, Verdict::Named | Verdict::Family) {
-        return;
-    }
     let (removed, needed) = (removed(explanation), needed(explanation));
-    if removed > 0.0 && (removed >= needed || !explanation.remaining.adequate) {
+    let little =
+        removed < needed && explanation.remaining.p_value >= CHANCE && runs_without(explanation);
+    match explanation.verdict {
+        Verdict::Named | Verdict::Family => {}
+        Verdict::Unexplained if little => {}
+        _ => return,
+    }
+    if removed > 0.0 && !little && (removed >= needed || !explanation.remaining.adequate) {
         take_back(
             explanation,
             Verdict::Unexplained,
@@ -131,6 +138,12 @@ pub(crate) fn doubt(explanation: &mut Explanation) {
             ),
         );
     }
+}
+
+/// Whether other parameters alone follow the recording in blocks left out.
+fn runs_without(explanation: &Explanation) -> bool {
+    let steps = explanation.fit.heldout.as_ref();
+    steps.is_some_and(|steps| steps.parameters_only.fit_percent >= FOLLOWS)
 }
 
 /// Puts another verdict in the place of a name, with the reason first. Where nothing is surely left out, no effects are listed.
@@ -182,8 +195,17 @@ pub(crate) fn stands_in(equations: &Explanation, doubtful: &Explanation) -> bool
 /// Whether the run with what was found leaves more than 1 % of the variance of an output, and most of that can be predicted from what was
 /// left before: slow noise, or physics that was not found.
 pub(crate) fn leaves_slow_error(explanation: &Explanation) -> bool {
+    leaves_slow_error_in(explanation, &|_| true)
+}
+
+/// The same in outputs with these names.
+pub(crate) fn leaves_slow_error_in(
+    explanation: &Explanation,
+    is_of: &dyn Fn(&str) -> bool,
+) -> bool {
     let most = (1.0 - FOLLOWS / 100.0).powi(2);
-    explanation.signals.iter().any(|trace| {
+    let traces = explanation.signals.iter();
+    traces.filter(|trace| is_of(&trace.output)).any(|trace| {
         let errors = errors(trace);
         let mask: Mask = vec![errors.iter().map(|e| e.is_finite()).collect()];
         let residual = vec![kept(&errors, &mask[0])];

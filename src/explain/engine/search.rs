@@ -240,7 +240,7 @@ fn judge_by_blocks(
 
 /// A term with a name in the place of a curve, of the same variables, that leaves structure or stands beside another effect: neither is
 /// the whole truth then, and of many values the criterion is for more numbers. The curve stays only where it is better in blocks left out
-/// by more than chance. The term must gain `least`.
+/// by more than chance, or takes most of what the term leaves off them. The term must gain `least`.
 fn named_for_curve(
     spec: &ModelSpec,
     step: &[Fitted],
@@ -255,7 +255,8 @@ fn named_for_curve(
         alike && f.gain > least && f.lead.curve.is_none() && named(spec, f) != "law"
     })?;
     let errors = |f: &Fitted| held_out(&f.candidate.plant, &f.fit, estimator, recordings, hold);
-    let better = errors(curve)?.surely_smaller(&errors(term)?);
+    let (of_curve, of_term) = (errors(curve)?, errors(term)?);
+    let better = of_curve.surely_smaller(&of_term) || of_curve.removed(&of_term) >= EXPLAINED;
     (!better).then(|| term.clone())
 }
 

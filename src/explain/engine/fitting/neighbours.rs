@@ -15,7 +15,7 @@ use crate::explain::engine::terms::term::{Needs, Port, Term, curve};
 use crate::explain::engine::terms::values::{grid, starts};
 use crate::explain::engine::thresholds::{FINISHED, GLANCE, MOST_STEPS, ROUNDS, THOROUGH, limited};
 use crate::physics::estimate::{Fit, PlantRecording, Study};
-use crate::physics::{ModelSpec, Unknown};
+use crate::physics::{ModelSpec, Unknown, VariableId, VariableKind};
 
 /// The richer form of a fit's term that fits best, or that of this again, where that gains what ties do not explain. What the simple form
 /// leaves would else be taken for a second effect.
@@ -120,12 +120,12 @@ pub(in crate::explain::engine) fn simpler_form(
     (best.gain >= fitted.gain && best.is_resolved(ground.study)).then_some(best)
 }
 
-/// Parts of what leaves one equation that start as what arrives in another.
-const ARRIVES: [f64; 2] = [1.0, 0.1];
+/// Parts of what leaves one equation that start as what arrives in another; negative of what enters both, such as a heat.
+const ARRIVES: [f64; 3] = [1.0, 0.1, -1.0];
 
 /// The same in a second equation too, with a strength of its own, where that gains what ties do not explain: what flows over the rim of
-/// one tank falls into the next, and what heats one body cools another. Where it is a function of the state of the second, it leaves
-/// that one.
+/// one tank falls into the next, and what heats one body cools another, or a current heats both. Where it is a function of the state of
+/// the second, it leaves that one.
 pub(in crate::explain::engine) fn also_elsewhere(
     fitted: &Fitted,
     given: &ModelSpec,
@@ -147,8 +147,10 @@ pub(in crate::explain::engine) fn also_elsewhere(
             return None;
         };
         let is_rate = matches!(spec.equations[at].unknown, Unknown::Derivative(_));
-        // What flows out of a store depends on what is in it.
-        let is_source = of.contains(&place.variable(spec)) || of.contains(&own);
+        // What flows out of a store depends on what is in it; an input may act on all.
+        let is_input = |v: &VariableId| spec.variable(*v).kind == VariableKind::Input;
+        let is_source =
+            of.contains(&place.variable(spec)) || of.contains(&own) || of.iter().all(is_input);
         (at != here && is_rate && is_source).then_some(at)
     });
     // Of a difference also each variable alone.

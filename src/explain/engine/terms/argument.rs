@@ -457,8 +457,14 @@ fn rate_of_sum(spec: &ModelSpec, id: ExpressionId) -> Option<String> {
 }
 
 /// Weighted sums of two and more variables that are factors, divisors or arguments of functions in the text, and are no variable and no
-/// plain difference.
-fn sums(spec: &ModelSpec, variables: &[VariableId]) -> Vec<Argument> {
+/// difference that is known.
+fn sums(spec: &ModelSpec, variables: &[VariableId], arguments: &[Argument]) -> Vec<Argument> {
+    let differences = arguments
+        .iter()
+        .filter(|a| a.form == ArgumentForm::Difference);
+    let known: Vec<[VariableId; 2]> = differences
+        .filter_map(|a| a.variables[..].try_into().ok())
+        .collect();
     let node = |id: ExpressionId| spec.expressions.node(id);
     let is_sum =
         |id: ExpressionId| matches!(node(id), Node::Binary(Binary::Add | Binary::Subtract, ..));
@@ -478,12 +484,13 @@ fn sums(spec: &ModelSpec, variables: &[VariableId]) -> Vec<Argument> {
             };
             of.sort();
             of.dedup();
-            let is_difference = match node(part) {
-                Node::Binary(Binary::Subtract, a, b) => [a, b]
-                    .iter()
-                    .all(|&side| matches!(node(side), Node::Variable(v) if of.contains(&v))),
-                _ => false,
+            let sides = match node(part) {
+                Node::Binary(Binary::Subtract, a, b) => [node(a), node(b)],
+                _ => [whole.clone(), whole.clone()],
             };
+            let is_difference = known.iter().any(|k| {
+                sides == k.map(Node::Variable) || sides == [k[1], k[0]].map(Node::Variable)
+            });
             let text = text_of(spec, part);
             let named = |v: &VariableId| text.contains(&spec.variable(*v).name);
             let is_new = of.len() > 1
@@ -556,7 +563,7 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
     }
     found.extend(driven(spec, &simple));
     found.extend(from_references(spec, &simple));
-    found.extend(sums(spec, &simple));
+    found.extend(sums(spec, &simple, &found));
     // Bodies radiate to each other, and each to a room.
     let fourth = |v: VariableId| match spec.variable(v).unit_text.as_deref() {
         Some("K") => Some(format!("({}/100)^4", name(v))),
