@@ -1,5 +1,6 @@
 //! Which of two explanations of simulated columns is given, and what is taken back where the simulator is not understood.
 
+use super::document::sentences::NOTHING_ADEQUATE;
 use super::engine::select::CHANCE;
 use super::explanation::{Explanation, SignalTraces, Verdict};
 use super::linear::answer::probability::UNLIKELY;
@@ -153,7 +154,8 @@ pub(crate) fn take_back(explanation: &mut Explanation, verdict: Verdict, reason:
     }
     explanation.verdict = verdict;
     // It is the probability of what is taken back.
-    let of_effect = |line: &String| line.contains("Probability that this is right");
+    let of_effect =
+        |line: &String| line.contains("Probability that this is right") || line == NOTHING_ADEQUATE;
     explanation.summary.retain(|line| !of_effect(line));
     explanation.summary.insert(0, reason.to_owned());
 }
@@ -344,6 +346,25 @@ mod tests {
         assert_eq!(judged(1.0, 0.9, true), (Verdict::Parameters, 0));
         assert_eq!(judged(1.0, 1.1, true), (Verdict::Parameters, 0));
         assert_eq!(judged(1.0, 0.5, false), (Verdict::Unexplained, 1));
+
+        // Little structure beside little that was explained, where other parameters follow the recording.
+        let little = |p_value: f64, fit: f64| {
+            let mut e = with_errors(&named, 1.0, 0.9, false);
+            e.verdict = Verdict::Unexplained;
+            e.remaining.p_value = p_value;
+            if let Some(steps) = &mut e.fit.heldout {
+                steps.parameters_only.fit_percent = fit;
+            }
+            e.summary.push(NOTHING_ADEQUATE.to_owned());
+            doubt(&mut e);
+            (
+                e.verdict,
+                e.summary.iter().any(|line| line == NOTHING_ADEQUATE),
+            )
+        };
+        assert_eq!(little(1e-8, 98.0), (Verdict::Parameters, false));
+        assert_eq!(little(1e-10, 98.0), (Verdict::Unexplained, true));
+        assert_eq!(little(1e-8, 80.0), (Verdict::Unexplained, true));
 
         // What makes blocks left out worse is no effect, however sure the criterion is of it.
         let unless_worse = |with: f64| unless_refuted(with_errors(&named, 1.0, with, true)).verdict;

@@ -52,6 +52,12 @@ fn slot(order: usize, power: usize) -> Option<usize> {
 }
 
 impl Chains {
+    /// Number of terms, and of outputs without a state: of equations that do the same those are likelier the simulator's in which each
+    /// output is what a store holds.
+    pub(crate) fn size(&self) -> usize {
+        self.terms.len() + self.orders.iter().filter(|order| **order == 0).count()
+    }
+
     /// States for the equations of all outputs. A signal enters the chain of an output once for each of its derivatives, and
     /// through the chains of the others.
     pub(crate) fn new(signals: &Signals, equations: &[OutputEquation]) -> Option<Self> {

@@ -180,7 +180,7 @@ impl Columns<'_> {
                     continue;
                 };
                 let better = |b: &Fitted| match b.misfit.max(found.misfit) <= REPRODUCED {
-                    true => found.chains.terms.len() < b.chains.terms.len(),
+                    true => found.chains.size() < b.chains.size(),
                     false => found.misfit < b.misfit,
                 };
                 if best.as_ref().is_none_or(better) {

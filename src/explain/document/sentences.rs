@@ -4,6 +4,10 @@ use crate::explain::effects::{Definition, Port, Unit};
 use crate::explain::explanation::{EFFECTS_TIE, EffectFound, Explanation, Quantity, Verdict};
 use crate::log::Channel;
 
+/// What is said first where nothing is named.
+pub(crate) const NOTHING_ADEQUATE: &str =
+    "Something is missing in the simulation that nothing in the library explains adequately.";
+
 /// The recording that shows what is not linear.
 pub(crate) const OTHER_AMPLITUDES: &str = "repeat the recording at half and at twice the amplitude, and once with a slow ramp over the whole range";
 
@@ -163,7 +167,7 @@ pub(crate) fn summary(e: &Explanation, needed: f64) -> Vec<String> {
             }
         }
         Verdict::Unexplained => lines.push(
-            "Something is missing in the simulation that nothing in the library explains adequately.".to_owned(),
+            NOTHING_ADEQUATE.to_owned(),
         ),
     }
     if let (Verdict::Unexplained, Some(nearest)) = (e.verdict, e.alternatives.first())

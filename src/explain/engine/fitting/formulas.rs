@@ -30,6 +30,9 @@ const FORMULAS: &[Term] = &[
     law("abs({z})^{p}", &[shape("p", POWERS, true)]),
     law("exp({z}/{s})", &[shape("s", WIDTHS, true)]),
     law("exp(-{z}/{s})", &[shape("s", WIDTHS, true)]),
+    // Through zero, where no parameter of the plant is the constant.
+    law("exp({z}/{s}) - 1", &[shape("s", WIDTHS, true)]),
+    law("exp(-{z}/{s}) - 1", &[shape("s", WIDTHS, true)]),
     law("tanh({z}/{s})", &[shape("s", WIDTHS, true)]),
     law("{z}/({s} + abs({z}))", &[shape("s", WIDTHS, true)]),
     // Through an orifice, laminar at small differences of pressure: the root alone has an infinite slope where it turns.
@@ -50,7 +53,7 @@ const FORMULAS: &[Term] = &[
     ),
 ];
 /// Formulas that are fitted to the recording: those nearest to the curve, and of the terms of the library those nearest to it.
-const FITTED: usize = 3;
+const FITTED: usize = 4;
 const LISTED: usize = 2;
 /// Parts of the values of a variable between which a function may turn.
 const KNOTS: u8 = 10;
