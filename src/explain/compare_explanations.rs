@@ -80,14 +80,14 @@ pub(crate) fn unless_refuted(mut explanation: Explanation) -> Explanation {
     explanation
 }
 
-/// Whether an explanation relative to a linear simulator needs no second opinion: it found nothing, or a listed effect that is not
-/// [`UNLIKELY`], or a law of outputs without units, whose name depends on these.
+/// Whether an explanation relative to a linear simulator needs no second opinion: it found nothing, or listed effects that are not
+/// [`UNLIKELY`], or one law of outputs without units, whose name depends on these.
 pub(crate) fn is_sure(explanation: &Explanation, has_units: bool) -> bool {
     match explanation.verdict {
         Verdict::Consistent | Verdict::Parameters => true,
-        Verdict::Named | Verdict::Family if is_law(explanation) => !has_units,
-        Verdict::Named | Verdict::Family => explanation.probability > UNLIKELY,
-        Verdict::Unexplained => false,
+        Verdict::Named if is_law(explanation) => !has_units && explanation.effects.len() == 1,
+        Verdict::Named => explanation.probability > UNLIKELY,
+        Verdict::Family | Verdict::Unexplained => false,
     }
 }
 
@@ -96,16 +96,19 @@ fn is_law(explanation: &Explanation) -> bool {
 }
 
 /// Whether an explanation by the equations of a linear simulator replaces one that is not sure: it names what the other does not, or
-/// a listed effect where the other has a law, and follows the recording as closely; or it follows clearly closer than another name.
+/// a listed effect where the other has a law or several candidates, or one law where the other has more effects, and follows the recording as
+/// closely; or it follows clearly closer than another name.
 pub(crate) fn replaces(equations: &Explanation, other: &Explanation) -> bool {
     let more = match other.verdict {
         Verdict::Unexplained => stands_in(equations, other),
         _ => {
-            let most = match is_law(other) {
+            let most = match is_law(other) || other.verdict == Verdict::Family {
                 true => 1.0 + EQUAL,
                 false => (1.0 - MOST).sqrt(),
             };
-            !is_law(equations) && error_over(equations, other).is_some_and(|e| e <= most)
+            let simpler = is_law(other) && equations.effects.len() < other.effects.len();
+            let named = !is_law(equations) || simpler;
+            named && error_over(equations, other).is_some_and(|e| e <= most)
         }
     };
     equations.verdict == Verdict::Named && more
@@ -325,6 +328,7 @@ mod tests {
         steps.augmented.rmse = with;
         e.fit.heldout = Some(steps);
         e.remaining.adequate = adequate;
+        e.remaining.p_value = if adequate { 0.5 } else { 1e-12 };
         e
     }
 
@@ -403,6 +407,12 @@ mod tests {
             &with(1.1, Verdict::Named, "quadratic_drag"),
             &law
         ));
+        let mut with_more = law.clone();
+        with_more.effects.push(drag.effects[0].clone());
+        assert!(!is_sure(&with_more, false) && replaces(&law, &with_more));
+        let several = with(1.0, Verdict::Family, "sensor_offset");
+        assert!(!is_sure(&several, false));
+        assert!(replaces(&drag, &several) && !replaces(&law, &several));
         assert!(replaces(&drag, &unexplained) && replaces(&law, &unexplained));
         assert!(!replaces(
             &with(0.1, Verdict::Unexplained, "law"),

@@ -667,7 +667,12 @@ mod tests {
         let found: Vec<(&str, Option<&str>)> = sums
             .map(|a| (a.expression.as_str(), a.rate.as_deref()))
             .collect();
-        let expected = [("(z + b*q)", Some("(v + (b)*w)")), ("(v + b*w)", None)];
+        // `e` is a variable of its own.
+        let expected = [
+            ("(z + b*q)", Some("(v + (b)*w)")),
+            ("(v + b*w)", None),
+            ("(r - z)", None),
+        ];
         assert_eq!(found, expected);
     }
 
