@@ -485,12 +485,15 @@ fn sums(spec: &ModelSpec, variables: &[VariableId], arguments: &[Argument]) -> V
             of.sort();
             of.dedup();
             let sides = match node(part) {
-                Node::Binary(Binary::Subtract, a, b) => [node(a), node(b)],
-                _ => [whole.clone(), whole.clone()],
+                Node::Binary(Binary::Subtract, a, b) => Some([node(a), node(b)]),
+                _ => None,
             };
-            let is_difference = known.iter().any(|k| {
-                sides == k.map(Node::Variable) || sides == [k[1], k[0]].map(Node::Variable)
-            });
+            let is_pair = |&[a, b]: &[VariableId; 2]| {
+                [[a, b], [b, a]]
+                    .map(|pair| Some(pair.map(Node::Variable)))
+                    .contains(&sides)
+            };
+            let is_difference = known.iter().any(is_pair);
             let text = text_of(spec, part);
             let named = |v: &VariableId| text.contains(&spec.variable(*v).name);
             let is_new = of.len() > 1
