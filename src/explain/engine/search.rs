@@ -16,7 +16,7 @@ use super::terms::term::Needs;
 use super::thresholds::{BETTER_FITS, FINISHED, LEFT, MOST, NEEDED, SECOND, SURE, chance};
 use crate::explain::explanation::EquationMap;
 use crate::physics::estimate::{EstimateError, EstimateOptions, Fit, Form, PlantRecording, Study};
-use crate::physics::{Hold, ModelSpec, Plant};
+use crate::physics::{Hold, ModelSpec, Plant, VariableId, VariableKind};
 
 /// What the search has found.
 #[derive(Clone)]
@@ -240,7 +240,8 @@ fn judge_by_blocks(
 
 /// A term with a name in the place of a curve, of the same variables, that leaves structure or stands beside another effect: neither is
 /// the whole truth then, and of many values the criterion is for more numbers. The curve stays only where it is better in blocks left out
-/// by more than chance, or takes most of what the term leaves off them. The term must gain `least`.
+/// by more than chance, or takes most of what the term leaves off them; a function of an input may do that because the input reacts
+/// (`super::misled`). The term must gain `least`.
 fn named_for_curve(
     spec: &ModelSpec,
     step: &[Fitted],
@@ -256,7 +257,14 @@ fn named_for_curve(
     })?;
     let errors = |f: &Fitted| held_out(&f.candidate.plant, &f.fit, estimator, recordings, hold);
     let (of_curve, of_term) = (errors(curve)?, errors(term)?);
-    let better = of_curve.surely_smaller(&of_term) || of_curve.removed(&of_term) >= EXPLAINED;
+    let is_input = |v: &VariableId| spec.variable(*v).kind == VariableKind::Input;
+    let of_input = curve
+        .depends
+        .iter()
+        .filter_map(|name| spec.find(name))
+        .any(|v| is_input(&v));
+    let takes_most = !of_input && of_curve.removed(&of_term) >= EXPLAINED;
+    let better = of_curve.surely_smaller(&of_term) || takes_most;
     (!better).then(|| term.clone())
 }
 
