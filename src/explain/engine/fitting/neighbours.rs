@@ -102,13 +102,15 @@ pub(in crate::explain::engine) fn simpler_form(
 ) -> Option<Fitted> {
     let (spec, lead) = (&ground.plant.spec, &fitted.lead);
     let wanted = special_case(named(spec, fitted))?;
-    let variables = &arguments[lead.argument?].variables;
+    let argument = &arguments[lead.argument?];
     let symbols = |term: &Term| term.shapes.iter().map(|s| s.symbol).collect::<Vec<_>>();
     let own = symbols(lead.term);
     let special = |t: &&Term| {
         let fewer = symbols(t);
         let is_part = fewer.len() < own.len() && own.starts_with(&fewer);
-        is_part && called(spec, t, lead.place, variables) == wanted
+        // A form with fewer shapes may need other values, such as a motion that never turns.
+        let serves = !fewer.is_empty() && argument.serves(t.needs);
+        is_part && serves && called(spec, t, lead.place, &argument.variables) == wanted
     };
     let fits = TERMS.iter().filter(special).filter_map(|term| {
         let start = (&fitted.shapes[..term.shapes.len()], fitted.strength());
