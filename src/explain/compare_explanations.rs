@@ -48,8 +48,7 @@ pub(crate) fn is_doubtful(explanation: &Explanation) -> bool {
         || match explanation.verdict {
             Verdict::Unexplained => true,
             Verdict::Named | Verdict::Family => removed(explanation) < needed(explanation),
-            // A noise model may have taken up what is missing.
-            Verdict::Consistent | Verdict::Parameters => leaves_slow_error(explanation),
+            Verdict::Consistent | Verdict::Parameters => false,
         }
 }
 
@@ -80,14 +79,14 @@ pub(crate) fn unless_refuted(mut explanation: Explanation) -> Explanation {
     explanation
 }
 
-/// Whether an explanation relative to a linear simulator needs no second opinion: it found nothing, or listed effects that are not
-/// [`UNLIKELY`], or one law of outputs without units, whose name depends on these.
+/// Whether an explanation relative to a linear simulator needs no second opinion: it found nothing, or a listed effect that is not
+/// [`UNLIKELY`], or a law of outputs without units, whose name depends on these.
 pub(crate) fn is_sure(explanation: &Explanation, has_units: bool) -> bool {
     match explanation.verdict {
         Verdict::Consistent | Verdict::Parameters => true,
-        Verdict::Named if is_law(explanation) => !has_units && explanation.effects.len() == 1,
-        Verdict::Named => explanation.probability > UNLIKELY,
-        Verdict::Family | Verdict::Unexplained => false,
+        Verdict::Named | Verdict::Family if is_law(explanation) => !has_units,
+        Verdict::Named | Verdict::Family => explanation.probability > UNLIKELY,
+        Verdict::Unexplained => false,
     }
 }
 
@@ -96,19 +95,16 @@ fn is_law(explanation: &Explanation) -> bool {
 }
 
 /// Whether an explanation by the equations of a linear simulator replaces one that is not sure: it names what the other does not, or
-/// a listed effect where the other has a law or several candidates, or one law where the other has more effects, and follows the recording as
-/// closely; or it follows clearly closer than another name.
+/// a listed effect where the other has a law, and follows the recording as closely; or it follows clearly closer than another name.
 pub(crate) fn replaces(equations: &Explanation, other: &Explanation) -> bool {
     let more = match other.verdict {
         Verdict::Unexplained => stands_in(equations, other),
         _ => {
-            let most = match is_law(other) || other.verdict == Verdict::Family {
+            let most = match is_law(other) {
                 true => 1.0 + EQUAL,
                 false => (1.0 - MOST).sqrt(),
             };
-            let simpler = is_law(other) && equations.effects.len() < other.effects.len();
-            let named = !is_law(equations) || simpler;
-            named && error_over(equations, other).is_some_and(|e| e <= most)
+            !is_law(equations) && error_over(equations, other).is_some_and(|e| e <= most)
         }
     };
     equations.verdict == Verdict::Named && more
@@ -200,17 +196,8 @@ pub(crate) fn stands_in(equations: &Explanation, doubtful: &Explanation) -> bool
 /// Whether the run with what was found leaves more than 1 % of the variance of an output, and most of that can be predicted from what was
 /// left before: slow noise, or physics that was not found.
 pub(crate) fn leaves_slow_error(explanation: &Explanation) -> bool {
-    leaves_slow_error_in(explanation, &|_| true)
-}
-
-/// The same in outputs with these names.
-pub(crate) fn leaves_slow_error_in(
-    explanation: &Explanation,
-    is_of: &dyn Fn(&str) -> bool,
-) -> bool {
     let most = (1.0 - FOLLOWS / 100.0).powi(2);
-    let traces = explanation.signals.iter();
-    traces.filter(|trace| is_of(&trace.output)).any(|trace| {
+    explanation.signals.iter().any(|trace| {
         let errors = errors(trace);
         let mask: Mask = vec![errors.iter().map(|e| e.is_finite()).collect()];
         let residual = vec![kept(&errors, &mask[0])];
@@ -407,12 +394,6 @@ mod tests {
             &with(1.1, Verdict::Named, "quadratic_drag"),
             &law
         ));
-        let mut with_more = law.clone();
-        with_more.effects.push(drag.effects[0].clone());
-        assert!(!is_sure(&with_more, false) && replaces(&law, &with_more));
-        let several = with(1.0, Verdict::Family, "sensor_offset");
-        assert!(!is_sure(&several, false));
-        assert!(replaces(&drag, &several) && !replaces(&law, &several));
         assert!(replaces(&drag, &unexplained) && replaces(&law, &unexplained));
         assert!(!replaces(
             &with(0.1, Verdict::Unexplained, "law"),

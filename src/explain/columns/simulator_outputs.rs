@@ -3,7 +3,7 @@
 
 use super::column::Column;
 use super::columns_answer::logs_with_recordings;
-use crate::explain::compare_explanations::leaves_slow_error_in;
+use crate::explain::compare_explanations::leaves_slow_error;
 use crate::explain::engine::terms::library::sensor_effects;
 use crate::explain::explanation::{Explanation, Verdict};
 use crate::explain::linear::check::Checked;
@@ -18,7 +18,7 @@ const SIMULATED: &str = "_simulated";
 /// Other parameters of a simulator look like another scale of its sensor, and they are not known here.
 const SCALE: &str = "sensor_scale";
 
-/// Explains the recording by effects of the sensors; none where these have no name, or leave a slow error in their outputs: it is not these
+/// Explains the recording by effects of the sensors; none where these have no name, or leave a slow error in an output: it is not the
 /// sensors then that are wrong, or not alone.
 pub(crate) fn explain_sensors(checked: &Checked, without: &[String]) -> Option<Explanation> {
     let Simulation::Outputs(simulated) = &checked.simulation else {
@@ -51,9 +51,8 @@ pub(crate) fn explain_sensors(checked: &Checked, without: &[String]) -> Option<E
     found.simulated_inputs = inputs
         .map(|v| plant.spec.variable(v).column().to_owned())
         .collect();
-    let is_of_effect = |output: &str| explanation.effects.iter().any(|e| e.signal == output);
-    let slow = leaves_slow_error_in(&explanation, &is_of_effect);
-    (explanation.verdict == Verdict::Named && !slow).then_some(explanation)
+    (explanation.verdict == Verdict::Named && !leaves_slow_error(&explanation))
+        .then_some(explanation)
 }
 
 fn text(inputs: &[Channel], outputs: &[Channel]) -> String {
