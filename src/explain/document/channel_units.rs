@@ -41,6 +41,22 @@ const POSITION_WORDS: &[&str] = &[
     "theta",
 ];
 
+/// Words that say that it is something else: the flow temperature of a heating circuit is no flow.
+const OTHER_WORDS: &[&str] = &[
+    "t",
+    "temp",
+    "temperature",
+    "p",
+    "press",
+    "pressure",
+    "force",
+    "torque",
+    "current",
+    "voltage",
+    "power",
+    "ratio",
+];
+
 /// The unit of a channel in lower case: of its brackets, else what the name ends with behind an underscore.
 fn written(channel: &Channel) -> Option<String> {
     let unit = channel.unit.clone();
@@ -66,8 +82,9 @@ pub(crate) fn is_in(channel: &Channel, unit: &str) -> bool {
 /// Whether a channel without a unit in brackets has one of these words in its name.
 fn is_called(channel: &Channel, words: &[&str]) -> bool {
     let name = channel.name.to_lowercase();
-    let mut parts = name.split(|c: char| !c.is_alphabetic());
-    channel.unit.is_none() && parts.any(|part| words.contains(&part))
+    let parts = || name.split(|c: char| !c.is_alphabetic());
+    let has = |words: &[&str]| parts().any(|part| words.contains(&part));
+    channel.unit.is_none() && has(words) && !has(OTHER_WORDS)
 }
 
 /// Whether `channel` is a speed or a flow.
@@ -114,6 +131,7 @@ mod tests {
         assert!(is_rate(&channel("speed", None)) && is_rate(&channel("Motor Speed", None)));
         assert!(!is_rate(&channel("speed", Some("V"))) && !is_rate(&channel("pos_rate_mm", None)));
         assert!(is_position(&channel("shaft_angle", None)));
+        assert!(!is_rate(&channel("flow_temperature", None)) && !is_rate(&channel("T_flow", None)));
         assert!(is_position(&channel("disp_mm", None)));
         assert!(is_position(&channel("angle", Some("Deg"))));
         assert!(!is_position(&channel("T", Some("K"))) && !is_position(&channel("y", None)));

@@ -344,7 +344,7 @@ mod tests {
 
     use super::*;
     use crate::explain::engine::fitting::edit::{places, sensors};
-    use crate::explain::engine::terms::argument::arguments;
+    use crate::explain::engine::terms::arguments_of_plant::arguments;
     use crate::explain::engine::terms::library::TERMS;
     use crate::explain::engine::terms::term::Needs;
     use crate::explain::engine::terms::values::grid;

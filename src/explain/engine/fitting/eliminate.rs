@@ -7,7 +7,7 @@ use crate::explain::engine::fitting::candidate::candidate;
 use crate::explain::engine::fitting::edit::Place;
 use crate::explain::engine::fitting::fitted::{Fitted, searched, with_more};
 use crate::explain::engine::screening::path::{hooked, path};
-use crate::explain::engine::terms::argument::arguments;
+use crate::explain::engine::terms::arguments_of_plant::arguments;
 use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH, limited};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Plant};

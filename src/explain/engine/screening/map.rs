@@ -65,7 +65,7 @@ fn label(place: Place, sensor: bool, spec: &ModelSpec) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::explain::engine::terms::argument::arguments;
+    use crate::explain::engine::terms::arguments_of_plant::arguments;
     use crate::explain::engine::terms::library::TERMS;
     use crate::physics::parse;
 

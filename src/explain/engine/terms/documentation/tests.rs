@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use super::*;
 use crate::explain::engine::fitting::edit::{Place, places, sensors};
-use crate::explain::engine::terms::argument::{ArgumentForm, arguments};
+use crate::explain::engine::terms::argument::ArgumentForm;
+use crate::explain::engine::terms::arguments_of_plant::arguments;
 use crate::explain::engine::terms::library::TERMS;
 use crate::explain::engine::terms::names::called;
 use crate::explain::engine::terms::term::{Needs, Port};
