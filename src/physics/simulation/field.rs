@@ -1,7 +1,7 @@
 //! The right-hand side of a plant at an instant: inputs as they are held, delays, one sweep of the tape.
 
 use super::dual::Dual;
-use super::plant::{Excitation, Hold};
+use super::run::{Excitation, Hold};
 use super::tape::{Frame, Tape};
 
 /// Columns of a Jacobian that are computed in one sweep.

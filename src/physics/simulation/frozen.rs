@@ -9,7 +9,8 @@
 
 use super::dual::Dual;
 use super::field::Field;
-use super::plant::{Direction, Excitation, Observer, Plan, Plant, Point};
+use super::plant::Plant;
+use super::run::{Direction, Excitation, Observer, Plan, Point};
 
 /// Parameters whose derivatives are computed in one sweep.
 const TOGETHER: usize = 8;

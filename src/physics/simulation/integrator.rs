@@ -3,7 +3,7 @@
 use super::dual::Dual;
 use super::field::Field;
 use super::linear::Propagator;
-use super::plant::{Direction, Excitation, Observer};
+use super::run::{Direction, Excitation, Observer};
 use super::step::{Accuracy, Stages};
 
 /// Stages of a run with slopes are solved to this part of their move: below the error of any step.

@@ -6,7 +6,7 @@
 
 use super::dual::Dual;
 use super::field::Field;
-use super::plant::Hold;
+use super::run::Hold;
 use crate::physics::expression::{Binary, ExpressionId, Node};
 use crate::physics::spec::{ModelSpec, Unknown, VariableKind};
 

@@ -5,7 +5,8 @@ use num_complex::Complex64;
 
 use super::dual::Dual;
 use super::field::LANES;
-use super::plant::{Plant, Point};
+use super::plant::Plant;
+use super::run::Point;
 use super::tape::{Frame, Tape};
 
 /// `dx/dt = A dx + B du`, `dy = C dx + D du` about a point, in continuous time.

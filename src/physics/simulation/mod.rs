@@ -12,6 +12,7 @@ mod integrator;
 mod linear;
 mod linearise;
 mod plant;
+mod run;
 mod step;
 mod step_control;
 mod tape;
@@ -19,6 +20,5 @@ mod tape;
 mod tests;
 
 pub use linearise::LinearPlant;
-pub use plant::{
-    Direction, Excitation, Hold, Observer, Plan, Plant, Point, SimulationError, Trajectory,
-};
+pub use plant::{Plant, SimulationError};
+pub use run::{Direction, Excitation, Hold, Observer, Plan, Point, Trajectory};

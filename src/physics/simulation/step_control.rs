@@ -9,7 +9,8 @@ use nalgebra::{Complex, DMatrix, DVector, Schur};
 use super::dual::Dual;
 use super::field::Field;
 use super::integrator::{FINEST, IMPLICIT, Integrator};
-use super::plant::{Excitation, Plan, Plant, SimulationError};
+use super::plant::{Plant, SimulationError};
+use super::run::{Excitation, Plan};
 use super::step::Accuracy;
 use super::tape::{SwitchSlots, Tape};
 
