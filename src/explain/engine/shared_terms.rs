@@ -141,7 +141,10 @@ fn shared(spec: &ModelSpec) -> Option<ModelSpec> {
 #[derive(Clone)]
 struct Factor {
     below: bool,
+    /// That of the factor with its sign.
     key: String,
+    sign: f64,
+    /// As it stands, without the sign.
     text: String,
     moves: bool,
 }
@@ -150,6 +153,8 @@ struct Factor {
 /// gauge shows of it: one variable more in the place of what they have in common.
 fn shared_product(spec: &ModelSpec) -> Option<ModelSpec> {
     let products = products(spec);
+    let inputs = spec.inputs().into_iter();
+    let inputs: Vec<&str> = inputs.map(|v| spec.variable(v).name.as_str()).collect();
     let mut best: Vec<Factor> = vec![];
     for (i, a) in products.iter().enumerate() {
         for b in products[i + 1..]
@@ -157,8 +162,9 @@ fn shared_product(spec: &ModelSpec) -> Option<ModelSpec> {
             .filter(|b| b.equation != a.equation)
         {
             let common = a.common(b);
-            // A name and a number, or what is shared already, is no term.
-            let term = common.iter().any(|f| f.moves) && common.iter().any(|f| !f.moves);
+            // A name and a number, or what is shared already, is no term; what scales an input is that input.
+            let moves = |f: &Factor| f.moves && !inputs.contains(&f.key.as_str());
+            let term = common.iter().any(moves) && common.iter().any(|f| !f.moves);
             if term && common.len() > best.len() {
                 best = common;
             }
@@ -166,6 +172,9 @@ fn shared_product(spec: &ModelSpec) -> Option<ModelSpec> {
     }
     best.first()?;
     let name = free_name(spec, SHARED_TERM);
+    for factor in best.iter_mut().filter(|f| f.sign < 0.0) {
+        factor.text = format!("(-{})", factor.text);
+    }
     let mut edit = Edit {
         declarations: vec![format!("Real {name};")],
         equations: vec![format!("{name} = {};", product_text(&best, None))],
@@ -213,7 +222,9 @@ impl Product {
             rest.swap_remove(rest.iter().position(same)?);
         }
         let text = product_text(&rest, Some(name));
-        Some(match self.sign < 0.0 {
+        // The others stand as they did, each with its own sign.
+        let sign = rest.iter().map(|f| f.sign).product::<f64>() * self.sign;
+        Some(match sign < 0.0 {
             true => format!("(-{text})"),
             false => text,
         })
@@ -282,12 +293,9 @@ fn factors(spec: &ModelSpec, id: ExpressionId) -> (f64, Vec<Factor>) {
                 sign *= own;
                 let span = spec.expressions.span(id);
                 let text = &spec.text[span.start..span.end];
-                let text = match (own < 0.0, node) {
-                    (true, _) => format!("(-({text}))"),
-                    (false, Node::Number(_) | Node::Variable(_) | Node::Call(..)) => {
-                        text.to_owned()
-                    }
-                    (false, _) => format!("({text})"),
+                let text = match node {
+                    Node::Number(_) | Node::Variable(_) | Node::Call(..) => text.to_owned(),
+                    _ => format!("({text})"),
                 };
                 let moves = |v: &VariableId| {
                     let kind = spec.variable(*v).kind;
@@ -297,6 +305,7 @@ fn factors(spec: &ModelSpec, id: ExpressionId) -> (f64, Vec<Factor>) {
                 factors.push(Factor {
                     below,
                     key,
+                    sign: own,
                     text,
                     moves,
                 });
@@ -494,6 +503,19 @@ mod tests {
         for (a, b) in runs[0][0].iter().zip(&runs[1][0]) {
             assert!((a - b).abs() < 1e-6, "{a} {b}");
         }
+    }
+
+    #[test]
+    fn factors_of_a_shared_product_stand_as_they_did() {
+        let found = made("der(s) = u - k*v*v*(s - w); der(v) = u - n*v; der(w) = k*v*v*(s - u);");
+        let found = found.unwrap();
+        let sound = found.contains("(s - w)*shared_term") && found.contains("(s - u)*shared_term");
+        assert!(sound && !found.contains("(-"), "{found}");
+        // What only scales an input is that input.
+        assert_eq!(
+            made("der(s) = 4*u*(v - s); der(v) = 4*u*(w - v); der(w) = -c*w;"),
+            None
+        );
     }
 
     #[test]

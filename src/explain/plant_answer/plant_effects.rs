@@ -424,14 +424,19 @@ fn lost(gain: f64, best: f64, answer: Option<&str>) -> String {
     }
 }
 
-/// The period in seconds of an angular frequency.
+/// The period of an angular frequency, in hours where it is at least two of them.
 fn period(frequency: &Quantity) -> Quantity {
-    let value = std::f64::consts::TAU / frequency.value.abs();
+    const HOUR: f64 = 3600.0;
+    let seconds = std::f64::consts::TAU / frequency.value.abs();
     let relative = frequency.std.map(|s| s / frequency.value.abs());
+    let (value, unit) = match seconds >= 2.0 * HOUR {
+        true => (seconds / HOUR, "h"),
+        false => (seconds, "s"),
+    };
     Quantity {
         value,
         std: relative.map(|r| r * value),
-        unit: "s".to_owned(),
+        unit: unit.to_owned(),
     }
 }
 
@@ -513,6 +518,8 @@ mod tests {
     fn a_frequency_has_a_period() {
         let said = quantity(&period(&measured(0.020_943_3, 0.000_195_4, "1/s")));
         assert_eq!(said, "300.0 +- 2.8 s");
+        let said = quantity(&period(&measured(1.4497e-4, 5.7e-7, "1/s")));
+        assert_eq!(said, "12.039 +- 0.047 h");
     }
 
     #[test]
