@@ -11,6 +11,7 @@ mod physics_messages;
 mod physics_mutations;
 mod physics_simulate;
 mod physics_texts;
+mod plant_arguments;
 mod plant_cli;
 mod plant_coast_down;
 mod plant_confounded;
@@ -25,7 +26,6 @@ mod plant_hypotheses;
 mod plant_initial_states;
 mod plant_long;
 mod plant_neighbours;
-
 mod plant_pairs;
 mod plant_parameters;
 mod plant_parts;

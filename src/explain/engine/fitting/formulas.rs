@@ -12,7 +12,7 @@ use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::TERMS;
 use crate::explain::engine::terms::richer::richer;
-use crate::explain::engine::terms::term::{Needs, Port, Starts, Term, curve, shape};
+use crate::explain::engine::terms::term::{Needs, Port, Shape, Starts, Term, curve, shape};
 use crate::explain::engine::terms::values::{Instance, evaluate, grid};
 use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH};
 use crate::physics::estimate::{Fit, Study};
@@ -60,10 +60,7 @@ const KNOTS: u8 = 10;
 /// Steps in which the straight part of a curve passes into the parameters.
 const PASSES: usize = 5;
 
-const fn law(
-    form: &'static str,
-    shapes: &'static [crate::explain::engine::terms::term::Shape],
-) -> Term {
+const fn law(form: &'static str, shapes: &'static [Shape]) -> Term {
     curve(FORMULA, Port::Equation, Needs::Anything, form, shapes)
 }
 
@@ -171,6 +168,66 @@ fn along_recordings(
     Some((values, knots.collect()))
 }
 
+/// Steps of a search for shapes: parts of a positive one, else of the standard deviation of the argument.
+const FIRST_STEP: f64 = 0.4;
+const LAST_STEP: f64 = 0.01;
+/// What is left must be less by this part for another round.
+const NEARER: f64 = 1e-3;
+
+/// The neighbours of a formula, each with one shape moved.
+fn moved(near: &Near, step: f64, spread: f64) -> Vec<(&'static Term, Vec<f64>)> {
+    let each = near.term.shapes.iter().enumerate();
+    let both = each.flat_map(|(i, shape)| [(i, shape, step), (i, shape, -step)]);
+    let of = |(i, shape, step): (usize, &Shape, f64)| {
+        let mut shapes = near.shapes.clone();
+        match shape.positive {
+            true => shapes[i] *= step.exp(),
+            false => shapes[i] += step * spread,
+        }
+        (near.term, shapes)
+    };
+    both.map(of).collect()
+}
+
+/// Takes over what is nearer than what is known of the same term. Whether anything is by more than [`NEARER`].
+fn take_nearer(found: &mut Vec<Near>, others: Vec<Near>) -> bool {
+    let mut any = false;
+    for near in others {
+        match found.iter_mut().find(|n| n.term == near.term) {
+            Some(known) if near.left < known.left => {
+                any |= near.left < (1.0 - NEARER) * known.left;
+                *known = near;
+            }
+            Some(_) => {}
+            None => found.push(near),
+        }
+    }
+    any
+}
+
+/// What one formula leaves of the function, beside a constant and a slope.
+fn regression(
+    wanted: &DVector<f64>,
+    z: &[f64],
+    column: &[f64],
+    instance: Instance,
+) -> Option<Near> {
+    let basis = DMatrix::from_fn(z.len(), 3, |i, j| [1.0, z[i], column[i]][j]);
+    let normal = (basis.transpose() * &basis).cholesky()?;
+    let regression = normal.solve(&(basis.transpose() * wanted));
+    let left = (wanted - &basis * &regression).norm_squared();
+    left.is_finite().then(|| Near {
+        term: instance.term,
+        shapes: instance.shapes,
+        strength: match instance.term.free_strength {
+            true => regression[2],
+            false => 1.0,
+        },
+        slope: regression[1],
+        left,
+    })
+}
+
 /// The regression of the function on each formula, beside a constant and a slope: those may be what parameters do.
 fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec<Near>> {
     let (wanted, knots) = along_recordings(best, arguments, ground)?;
@@ -216,34 +273,42 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
             })
         })
         .collect();
-    let columns = evaluate(&instances, arguments, ground.recordings)?;
-    let z: Vec<f64> = argument.values.concat();
+    // Beyond its ends a curve is level, and the plant without it may run far beyond them: nothing is known there.
+    let all: Vec<f64> = argument.values.concat();
+    let inside = |z: f64| match (&best.lead.curve, knots.first(), knots.last()) {
+        (Some(_), Some(&low), Some(&high)) => (low..=high).contains(&z),
+        _ => true,
+    };
+    let known = |column: &[f64]| -> Vec<f64> {
+        let pairs = column.iter().zip(&all).filter(|(_, z)| inside(**z));
+        pairs.map(|(value, _)| *value).collect()
+    };
+    let z = known(&all);
+    let wanted = DVector::from_vec(known(wanted.as_slice()));
+    let regress = |instances: Vec<Instance>| -> Option<Vec<Near>> {
+        let columns = evaluate(&instances, arguments, ground.recordings)?;
+        let each = instances.into_iter().zip(columns);
+        let near = each.filter_map(|(instance, column)| {
+            regression(&wanted, &z, &known(&column.concat()), instance)
+        });
+        Some(near.collect())
+    };
     let mut found: Vec<Near> = Vec::new();
-    for (instance, column) in instances.into_iter().zip(columns) {
-        let column = column.concat();
-        let basis = DMatrix::from_fn(z.len(), 3, |i, j| [1.0, z[i], column[i]][j]);
-        let Some(normal) = (basis.transpose() * &basis).cholesky() else {
-            continue;
-        };
-        let regression = normal.solve(&(basis.transpose() * &wanted));
-        let left = (&wanted - &basis * &regression).norm_squared();
-        if !left.is_finite() {
-            continue;
-        }
-        let near = Near {
-            term: instance.term,
-            shapes: instance.shapes,
-            strength: match instance.term.free_strength {
-                true => regression[2],
-                false => 1.0,
-            },
-            slope: regression[1],
-            left,
-        };
-        match found.iter_mut().find(|n| n.term == near.term) {
-            Some(known) if near.left < known.left => *known = near,
-            Some(_) => {}
-            None => found.push(near),
+    take_nearer(&mut found, regress(instances)?);
+    // How near a formula comes depends on its shapes more than the starts are close.
+    let mut step = FIRST_STEP;
+    while step > LAST_STEP {
+        let formulas = found.iter().filter(|near| near.term.id == FORMULA);
+        let neighbours: Vec<Instance> = formulas
+            .flat_map(|near| moved(near, step, argument.spread()))
+            .map(|(term, shapes)| Instance {
+                term,
+                argument: Some(at),
+                shapes,
+            })
+            .collect();
+        if neighbours.is_empty() || !take_nearer(&mut found, regress(neighbours)?) {
+            step *= 0.5;
         }
     }
     found.sort_by(|a, b| a.left.total_cmp(&b.left));
