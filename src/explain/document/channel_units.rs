@@ -7,6 +7,7 @@ const WRITTEN: &[&[&str]] = &[
     &["deg", "\u{b0}", "degree", "degrees", "grad"],
     &["rad", "radian", "radians"],
     &["degC", "degc", "\u{b0}c", "c", "celsius", "grad c"],
+    &["degF", "degf", "\u{b0}f", "f", "fahrenheit", "deg f"],
     &["K", "k", "kelvin"],
 ];
 
@@ -120,6 +121,8 @@ mod tests {
     fn units_are_known_from_brackets_and_names() {
         assert!(is_in(&channel("T_furnace_degC", None), "degC"));
         assert!(is_in(&channel("T", Some("\u{b0}C")), "degC"));
+        assert!(is_in(&channel("Chamber", Some("degF")), "degF"));
+        assert!(is_in(&channel("T", Some("\u{b0}F")), "degF"));
         assert!(is_in(&channel("T_reactor", Some("K")), "K"));
         assert!(is_in(&channel("angle", Some("deg")), "deg"));
         assert!(!is_in(&channel("angle", Some("deg")), "degC"));

@@ -17,6 +17,18 @@ pub(super) static ENTRIES: &[Definition] = &[
     },
     Definition {
         id: "radiation",
+        variant: "degF",
+        name: "radiation of heat",
+        equation: "F = -k (T^4 - Tc^4 - 4 Tc^3 (T - Tc))/1e8, T = x + 459.67",
+        parameters: LINEARISED,
+        mimics: RADIATION_MIMICS,
+        linear: &[],
+        persists: true,
+        action: Action::Force(radiation_fahrenheit, Needs::Position, Sense::Resists),
+        starts: middle,
+    },
+    Definition {
+        id: "radiation",
         variant: "K",
         name: "radiation of heat",
         equation: "F = -k (x^4 - Tc^4 - 4 Tc^3 (x - Tc))/1e8",
@@ -52,11 +64,16 @@ const RADIATION_MIMICS: &[Mimic] = &[Mimic {
     experiment: "steps of the power from low to the highest temperatures: radiation grows with the fourth power of the absolute temperature",
 }];
 
-/// Zero of the Celsius scale in kelvin.
+/// Zeros of the Celsius scale in kelvin, and of Fahrenheit's in degrees Rankine.
 const ZERO_CELSIUS: f64 = 273.15;
+const ZERO_FAHRENHEIT: f64 = 459.67;
 
 fn radiation_celsius(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     motion.at_middle(|x| radiation(x + ZERO_CELSIUS, p[0] + ZERO_CELSIUS))
+}
+
+fn radiation_fahrenheit(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    motion.at_middle(|x| radiation(x + ZERO_FAHRENHEIT, p[0] + ZERO_FAHRENHEIT))
 }
 
 fn radiation_kelvin(p: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {

@@ -260,10 +260,8 @@ impl Definition {
 
     /// Unit that the output must be measured in, where the law holds for one unit only.
     pub(crate) fn unit_of_output(&self) -> Option<&'static str> {
-        match self.variant {
-            "deg" | "rad" | "degC" | "K" => Some(self.variant),
-            _ => None,
-        }
+        let unit = self.variant.split(' ').next();
+        unit.filter(|unit| matches!(*unit, "deg" | "rad" | "degC" | "degF" | "K"))
     }
 
     /// Where the effect acts.

@@ -216,6 +216,30 @@ pub(super) static ENTRIES: &[Definition] = &[
         starts: |seen| turns(seen, std::f64::consts::TAU),
     },
     Definition {
+        id: "gravity_torque",
+        variant: "deg from level",
+        name: "torque of gravity, which is largest where the angle is zero,",
+        equation: "F = -k (cos(x) - 1), x in degrees",
+        parameters: &[],
+        mimics: SINE_MIMICS,
+        linear: &[],
+        persists: true,
+        action: Action::Force(level_degrees, Needs::Position, Sense::Either),
+        starts: |seen| turns(seen, 360.0),
+    },
+    Definition {
+        id: "gravity_torque",
+        variant: "rad from level",
+        name: "torque of gravity, which is largest where the angle is zero,",
+        equation: "F = -k (cos(x) - 1), x in radians",
+        parameters: &[],
+        mimics: SINE_MIMICS,
+        linear: &[],
+        persists: true,
+        action: Action::Force(level_radians, Needs::Position, Sense::Either),
+        starts: |seen| turns(seen, std::f64::consts::TAU),
+    },
+    Definition {
         id: "law",
         variant: "",
         name: "force or flow that depends on the output along a curve",
@@ -277,6 +301,15 @@ fn gravity_degrees(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
 
 fn gravity_radians(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
     motion.at_middle(gravity)
+}
+
+/// The same of an angle that is zero where the arm is level.
+fn level_degrees(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    motion.at_middle(|x| (1.0 - x.to_radians().cos()).to_degrees())
+}
+
+fn level_radians(_: &[f64], motion: &Motion, _: &mut [f64; 3]) -> f64 {
+    motion.at_middle(|x| 1.0 - x.cos())
 }
 
 /// One start without a shape where the position moves as an angle does: over a tenth of a turn and not over many turns.

@@ -269,9 +269,33 @@ impl<'a> Study<'a> {
 
     /// Whitened derivatives of the predictions by the free numbers that are not at a bound.
     pub(crate) fn derivatives(&self, fit: &Fit) -> Option<DMatrix<f64>> {
-        let all =
-            Deviance::new(&self.problem, fit.form, fit.noise.clone()).derivatives(&fit.point)?;
+        let all = self.all_derivatives(fit)?;
         Some(all.select_columns(&self.inside(fit)))
+    }
+
+    /// The same by all free numbers.
+    pub(crate) fn all_derivatives(&self, fit: &Fit) -> Option<DMatrix<f64>> {
+        Deviance::new(&self.problem, fit.form, fit.noise.clone()).derivatives(&fit.point)
+    }
+
+    /// How far each of the free numbers may be from its value: between its bounds, or its size; infinite where nothing says it.
+    pub(crate) fn reaches(&self, fit: &Fit) -> Vec<f64> {
+        let mut reaches: Vec<f64> = self.problem.ranges().iter().map(|r| r.reach).collect();
+        reaches.resize(fit.point.len(), f64::INFINITY);
+        reaches
+    }
+
+    /// The free numbers at a bound, by their places, and the sign of their ways back.
+    pub(crate) fn at_bounds(&self, fit: &Fit) -> Vec<(usize, f64)> {
+        let ranges = self
+            .problem
+            .ranges()
+            .into_iter()
+            .zip(&fit.point)
+            .enumerate();
+        let way = ranges.map(|(i, (range, x))| (i, if *x <= range.min { 1.0 } else { -1.0 }));
+        let inside = self.inside(fit);
+        way.filter(|(i, _)| !inside.contains(i)).collect()
     }
 
     /// The free numbers that are not at a bound, by their places.

@@ -7,27 +7,35 @@ use crate::explain::engine::fitting::candidate::candidate;
 use crate::explain::engine::fitting::edit::Place;
 use crate::explain::engine::fitting::fitted::{Fitted, searched, with_more};
 use crate::explain::engine::hypothesis::Ground;
-use crate::explain::engine::screening::curve::Curve;
+use crate::explain::engine::screening::curve::{Curve, knots, piece};
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
-use crate::explain::engine::terms::library::TERMS;
+use crate::explain::engine::terms::library::{CURVE, TERMS};
 use crate::explain::engine::terms::richer::richer;
 use crate::explain::engine::terms::term::{Needs, Port, Shape, Starts, Term, curve, shape};
 use crate::explain::engine::terms::values::{Instance, evaluate, grid};
-use crate::explain::engine::thresholds::{GLANCE, MOST_STEPS, ROUNDS, THOROUGH};
-use crate::physics::estimate::{Fit, Study};
+use crate::explain::engine::thresholds::{MOST_STEPS, ROUNDS, THOROUGH};
+use crate::physics::estimate::{Fit, PlantRecording, Study};
 
 /// Id of all of these terms.
 pub(in crate::explain::engine) const FORMULA: &str = "formula";
 
 const WIDTHS: Starts = Starts::Spread(&[0.1, 0.2, 0.5, 1.0, 2.0]);
 const MIDDLES: Starts = Starts::Quantiles(&[0.1, 0.3, 0.5, 0.7, 0.9]);
-const POWERS: Starts = Starts::Powers(&[0.5, 1.5, 2.5, 4.0]);
+const POWERS: Starts = Starts::Powers(&[0.5, 1.0, 1.5, 2.5, 4.0]);
 
 /// Functions of one variable with one or two shapes: powers, growth, decay, saturation, orifices, rise and fall.
 const FORMULAS: &[Term] = &[
-    law("sign({z})*abs({z})^{p}", &[shape("p", POWERS, true)]),
+    curve(
+        FORMULA,
+        Port::Equation,
+        Needs::BothSigns,
+        "sign({z})*abs({z})^{p}",
+        &[shape("p", POWERS, true)],
+    ),
     law("abs({z})^{p}", &[shape("p", POWERS, true)]),
+    // Hyperbolas, of what stays away from zero: a load of constant power.
+    law("abs({z})^(-{p})", &[shape("p", POWERS, true)]),
     law("exp({z}/{s})", &[shape("s", WIDTHS, true)]),
     law("exp(-{z}/{s})", &[shape("s", WIDTHS, true)]),
     // Through zero, where no parameter of the plant is the constant.
@@ -43,6 +51,9 @@ const FORMULAS: &[Term] = &[
     law("{z}*exp(-({z}/{s})^2)", &[shape("s", WIDTHS, true)]),
     law("{z}/(1 + ({z}/{s})^2)", &[shape("s", WIDTHS, true)]),
     law("1/(1 + ({z}/{s})^2)", &[shape("s", WIDTHS, true)]),
+    // ... beside a parameter that is the value at zero.
+    law("1/(1 + ({z}/{s})^2) - 1", &[shape("s", WIDTHS, true)]),
+    law("exp(-({z}/{s})^2) - 1", &[shape("s", WIDTHS, true)]),
     law(
         "exp(-(({z} - {o})/{s})^2)",
         &[shape("o", MIDDLES, false), shape("s", WIDTHS, true)],
@@ -52,13 +63,13 @@ const FORMULAS: &[Term] = &[
         &[shape("o", MIDDLES, false), shape("s", WIDTHS, true)],
     ),
 ];
+/// Singular values below this part of the largest are rounding.
+const RANK: f64 = 1e-7;
 /// Formulas that are fitted to the recording: those nearest to the curve, and of the terms of the library those nearest to it.
 const FITTED: usize = 4;
 const LISTED: usize = 2;
-/// Parts of the values of a variable between which a function may turn.
-const KNOTS: u8 = 10;
-/// Steps in which the straight part of a curve passes into the parameters.
-const PASSES: usize = 5;
+/// Points between two knots at which a formula is compared with the straight piece there.
+const BETWEEN: usize = 8;
 
 const fn law(form: &'static str, shapes: &'static [Shape]) -> Term {
     curve(FORMULA, Port::Equation, Needs::Anything, form, shapes)
@@ -69,9 +80,9 @@ struct Near {
     term: &'static Term,
     shapes: Vec<f64>,
     strength: f64,
-    /// Slope of the curve's straight part beside it.
-    slope: f64,
-    /// What it leaves of the curve's sum of squares about its straight part.
+    /// Its values at the knots.
+    values: DVector<f64>,
+    /// What it leaves of the residual that the curve could take, as a sum of squares.
     left: f64,
 }
 
@@ -80,20 +91,28 @@ pub(in crate::explain::engine) fn formulas(
     best: &Fitted,
     arguments: &[Argument],
     ground: &Ground,
-) -> Vec<Fitted> {
-    let nearest = nearest(best, arguments, ground).unwrap_or_default();
-    nearest
+) -> Option<Vec<Fitted>> {
+    let fitted = match &best.lead.curve {
+        Some(_) => best.clone(),
+        None => as_curve(best, arguments, ground)?,
+    };
+    let options = with_more(ground.options, fitted.candidate.values.len());
+    let rough = fitted.candidate.rough(ground.study, MOST_STEPS);
+    let study = ground.study.of(&rough, &options).ok()?;
+    let curved = Curved::of(&fitted, &study, ground.study.parameters())?;
+    let nearest = nearest(best, &curved, arguments, ground)?;
+    let found = nearest
         .par_iter()
         .filter_map(|near| {
-            let level = levelled(best, near.slope, ground);
-            let best = level.as_ref().unwrap_or(best);
             let start = (&near.shapes[..], near.strength);
             let refit = |study: &Study, from: &Fit| study.refit(from, ROUNDS, THOROUGH);
             let what = (near.term, best.lead.argument);
-            in_its_place(best, what, start, &refit, arguments, ground)
+            let from =
+                |start_of: &Fitted| in_its_place(start_of, what, start, &refit, arguments, ground);
+            from(&curved.with(&near.values)).or_else(|| from(&fitted))
         })
-        .filter(|f| turns_inside(f, arguments))
-        .collect()
+        .filter(|f| turns_inside(f, arguments));
+    Some(found.collect())
 }
 
 /// Whether the middle of a formula is among the values of its argument: what rises or falls beyond them is a constant.
@@ -106,66 +125,189 @@ fn turns_inside(fitted: &Fitted, arguments: &[Argument]) -> bool {
     })
 }
 
-/// The curve of a fit, as its knots have it.
-fn fitted_curve(best: &Fitted, ground: &Ground) -> Option<Curve> {
-    let knots = best.lead.curve.as_ref()?.knots.clone();
-    let first = ground.study.parameters();
-    let values = best.fit.point[first..first + knots.len()].to_vec();
-    Some(Curve { knots, values })
+/// A function as a curve, and what the recording says of its values: how the sum of squares grows with them where all other numbers
+/// do their best. What parameters can do in its place, and where no free run comes, does not count in it.
+struct Curved<'a> {
+    /// The fit with the curve in the place of its term.
+    fitted: &'a Fitted,
+    study: &'a Study<'a>,
+    curve: Curve,
+    /// Root of the information of the values.
+    root: DMatrix<f64>,
+    /// What the root makes of the best values.
+    wanted: DVector<f64>,
+    /// The other numbers, and what each of them changes by when a value does.
+    others: Vec<usize>,
+    instead: DMatrix<f64>,
 }
 
-/// The fit with a curve that rises less by `slope`, where parameters can do that instead: a formula that leaves it to them starts from
-/// there without a jump. Step by step, because what is straight may move a resonance far.
-fn levelled(best: &Fitted, slope: f64, ground: &Ground) -> Option<Fitted> {
-    let curve = fitted_curve(best, ground)?;
-    let options = with_more(ground.options, best.candidate.values.len());
-    let rough = best.candidate.rough(ground.study, MOST_STEPS);
-    let inner = ground.study.of(&rough, &options).ok()?;
-    let first = ground.study.parameters();
-    let held: Vec<usize> = (first..first + curve.knots.len()).collect();
-    let mut fit = best.fit.clone();
-    for pass in 1..=PASSES {
-        let part = slope * pass as f64 / PASSES as f64;
-        for (i, (knot, value)) in curve.knots.iter().zip(&curve.values).enumerate() {
-            fit.point[first + i] = value - part * knot;
+impl<'a> Curved<'a> {
+    /// The numbers of the curve begin at `first`.
+    fn of(fitted: &'a Fitted, study: &'a Study<'a>, first: usize) -> Option<Self> {
+        let knots = fitted.lead.curve.as_ref()?.knots.clone();
+        let own = first..first + knots.len();
+        let values = fitted.fit.point[own.clone()].to_vec();
+        let inside = study.inside(&fitted.fit).into_iter();
+        let others: Vec<usize> = inside.filter(|i| !own.contains(i)).collect();
+        // A row more for each of the others, which says how far it may be: where they scale with the curve, all of them could vanish.
+        let derivatives = study.all_derivatives(&fitted.fit)?;
+        let samples = derivatives.nrows();
+        let rows = samples + others.len();
+        let values_alone = derivatives.columns(own.start, knots.len()).into_owned();
+        let mut of_values = values_alone.resize_vertically(rows, 0.0);
+        let mut of_others = derivatives
+            .select_columns(&others)
+            .resize_vertically(rows, 0.0);
+        let reaches = study.reaches(&fitted.fit);
+        for (j, &i) in others.iter().enumerate() {
+            of_others[(samples + j, j)] = 12.0_f64.sqrt() / reaches[i];
         }
-        fit = inner.holding(&fit, &held, GLANCE)?;
+        let norms: Vec<f64> = of_others.column_iter().map(|c| c.norm()).collect();
+        for (mut column, norm) in of_others.column_iter_mut().zip(&norms) {
+            column /= norm.max(f64::MIN_POSITIVE);
+        }
+        let mut instead = DMatrix::zeros(others.len(), knots.len());
+        if !others.is_empty() {
+            let parts = of_others.svd(true, true);
+            instead = -parts.solve(&of_values, RANK).ok()?;
+            for (mut row, norm) in instead.row_iter_mut().zip(&norms) {
+                row /= norm.max(f64::MIN_POSITIVE);
+            }
+            let directions = parts.u?;
+            let kept = parts.singular_values.iter().enumerate();
+            let kept: Vec<usize> = kept.filter(|(_, s)| **s > RANK).map(|(i, _)| i).collect();
+            let directions = directions.select_columns(&kept);
+            of_values -= &directions * directions.tr_mul(&of_values);
+        }
+        let noise = &fitted.fit.noise;
+        let residual = noise.whiten_kept(&study.residual(&fitted.fit)?, study.mask());
+        let weighted = residual.iter().map(|&e| noise.weight(e) * e);
+        let residual = DVector::from_iterator(residual.len(), weighted);
+        let residual = residual.resize_vertically(rows, 0.0);
+        let parts = of_values.qr();
+        let root = parts.r();
+        let curve = Curve { knots, values };
+        let best = DVector::from_column_slice(&curve.values);
+        let wanted = parts.q().tr_mul(&residual) + &root * best;
+        Some(Self {
+            fitted,
+            study,
+            curve,
+            root,
+            wanted,
+            others,
+            instead,
+        })
     }
-    // What no parameter does stays in the curve.
-    let allowed = inner.cost_of_a_number() * curve.knots.len() as f64;
-    let rises = inner.information() * (fit.deviance - best.fit.deviance);
-    (rises < allowed).then(|| Fitted {
-        fit,
-        ..best.clone()
-    })
+
+    /// The fit with all other numbers where they do their best beside these values, as far as they are linear.
+    fn with(&self, values: &DVector<f64>) -> Fitted {
+        let change = values - DVector::from_column_slice(&self.curve.values);
+        let mut shift = vec![0.0; self.fitted.fit.point.len()];
+        for (&i, s) in self.others.iter().zip(&(&self.instead * change)) {
+            shift[i] = *s;
+        }
+        let point = self.study.moved(&self.fitted.fit, &shift);
+        let mut fitted = self.fitted.clone();
+        fitted.fit.point = point;
+        fitted
+    }
+
+    /// What values of a formula, but for its strength, leave.
+    fn regression(&self, instance: Instance, values: DVector<f64>) -> Option<Near> {
+        let column = &self.root * &values;
+        let strength = match instance.term.free_strength {
+            true => column.dot(&self.wanted) / column.norm_squared(),
+            false => 1.0,
+        };
+        let left = (&self.wanted - strength * column).norm_squared();
+        left.is_finite().then(|| Near {
+            term: instance.term,
+            shapes: instance.shapes,
+            strength,
+            values: strength * values,
+            left,
+        })
+    }
+
+    /// Whether less is left than the function explains, with all that its numbers cost.
+    fn is_part(&self, near: &Near, best: &Fitted) -> bool {
+        let cost = self.study.cost_of_a_number() * self.curve.knots.len() as f64;
+        self.study.information() * near.left < best.gain + cost
+    }
+
+    /// Formulas as curves with the same knots, each the nearest to it, and what they leave.
+    fn regressions(
+        &self,
+        mut instances: Vec<Instance>,
+        argument: &Argument,
+        recordings: &[PlantRecording],
+    ) -> Option<Vec<Near>> {
+        let knots = &self.curve.knots;
+        let pieces = knots.windows(2).flat_map(|k| {
+            let part = move |j: usize| k[0] + (k[1] - k[0]) * j as f64 / BETWEEN as f64;
+            (0..BETWEEN).map(part)
+        });
+        let along: Vec<f64> = pieces.chain(knots.last().copied()).collect();
+        let hats = DMatrix::from_fn(along.len(), knots.len(), |i, j| piece(knots, j, along[i]));
+        let normal = hats.tr_mul(&hats).cholesky()?;
+        let first = recordings.first()?;
+        let dense = PlantRecording {
+            inputs: vec![],
+            outputs: vec![vec![0.0; along.len()]],
+            ..first.clone()
+        };
+        let mut argument = argument.clone();
+        argument.set(vec![along.clone()], vec![along]);
+        for instance in &mut instances {
+            instance.argument = Some(0);
+        }
+        let values = evaluate(&instances, &[argument], &[dense])?;
+        let each = instances.into_iter().zip(values);
+        let near = each.filter_map(|(instance, values)| {
+            let values = DVector::from_vec(values.concat());
+            self.regression(instance, normal.solve(&hats.tr_mul(&values)))
+        });
+        Some(near.collect())
+    }
 }
 
-/// What a fitted function adds along the recordings, and where it may turn.
-fn along_recordings(
-    best: &Fitted,
-    arguments: &[Argument],
-    ground: &Ground,
-) -> Option<(DVector<f64>, Vec<f64>)> {
-    let at = best.lead.argument?;
-    let argument = &arguments[at];
-    if let Some(curve) = fitted_curve(best, ground) {
-        let z = argument.values.iter().flatten();
-        let values = z.map(|&z| curve.at(z)).collect::<Vec<_>>();
-        return Some((DVector::from_vec(values), curve.knots));
-    }
-    let term = best.lead.term;
+/// A fit with a curve in the place of its term, a function of one variable.
+fn as_curve(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Fitted> {
+    let (term, at) = (best.lead.term, best.lead.argument?);
     if !term.memories.is_empty() || !term.free_strength {
         return None;
     }
+    let knots = knots(&arguments[at]);
+    let mut argument = arguments[at].clone();
+    argument.set(vec![knots.clone()], vec![knots.clone()]);
+    let shapes = best.shapes.clone();
     let instance = Instance {
         term,
-        argument: Some(at),
-        shapes: best.shapes.clone(),
+        argument: Some(0),
+        shapes,
     };
-    let values = evaluate(&[instance], arguments, ground.recordings)?;
-    let values = best.strength() * DVector::from_vec(values.concat().concat());
-    let knots = (1..KNOTS).map(|k| argument.quantile(f64::from(k) / f64::from(KNOTS)));
-    Some((values, knots.collect()))
+    let recording = PlantRecording {
+        inputs: vec![],
+        outputs: vec![vec![0.0; knots.len()]],
+        ..ground.recordings.first()?.clone()
+    };
+    let values = evaluate(&[instance], &[argument], &[recording])?;
+    let values = values.concat().concat();
+    let values = values.iter().map(|v| best.strength() * v).collect();
+    let mut lead = Lead::untested(&CURVE, best.lead.place).at(best.lead.place, Some(at), &[]);
+    lead.arrives = best.arrives();
+    lead.curve = Some(Curve { knots, values });
+    let parameters = ground.study.parameters();
+    let made = candidate(&ground.plant.spec, &lead, arguments, ground.recordings)?;
+    let fit = made.from(&best.without_term(parameters), parameters);
+    Some(Fitted {
+        lead,
+        candidate: made,
+        fit,
+        shapes: vec![],
+        ..best.clone()
+    })
 }
 
 /// Steps of a search for shapes: parts of a positive one, else of the standard deviation of the argument.
@@ -205,35 +347,16 @@ fn take_nearer(found: &mut Vec<Near>, others: Vec<Near>) -> bool {
     any
 }
 
-/// What one formula leaves of the function, beside a constant and a slope.
-fn regression(
-    wanted: &DVector<f64>,
-    z: &[f64],
-    column: &[f64],
-    instance: Instance,
-) -> Option<Near> {
-    let basis = DMatrix::from_fn(z.len(), 3, |i, j| [1.0, z[i], column[i]][j]);
-    let normal = (basis.transpose() * &basis).cholesky()?;
-    let regression = normal.solve(&(basis.transpose() * wanted));
-    let left = (wanted - &basis * &regression).norm_squared();
-    left.is_finite().then(|| Near {
-        term: instance.term,
-        shapes: instance.shapes,
-        strength: match instance.term.free_strength {
-            true => regression[2],
-            false => 1.0,
-        },
-        slope: regression[1],
-        left,
-    })
-}
-
-/// The regression of the function on each formula, beside a constant and a slope: those may be what parameters do.
-fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec<Near>> {
-    let (wanted, knots) = along_recordings(best, arguments, ground)?;
+/// The formulas that leave least.
+fn nearest(
+    best: &Fitted,
+    curved: &Curved,
+    arguments: &[Argument],
+    ground: &Ground,
+) -> Option<Vec<Near>> {
+    let knots = &curved.curve.knots;
     let at = best.lead.argument?;
     let argument = &arguments[at];
-    let in_equation = matches!(best.lead.place, Place::Equation(_));
     // Of an input also limits and dead zones whose sides differ: a curve of it has both sides already.
     let richer_ones = TERMS.iter().filter(|term| term.port == Port::Input);
     let richer_ones = richer_ones.flat_map(richer);
@@ -247,8 +370,8 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
         };
         is_function && another && at_place && argument.serves(term.needs)
     });
-    let instances: Vec<Instance> = FORMULAS
-        .iter()
+    let of_argument = FORMULAS.iter().filter(|term| argument.serves(term.needs));
+    let instances: Vec<Instance> = of_argument
         .chain(listed)
         .flat_map(|term| {
             let mut all = grid(term, Some(argument), ground.recordings, &[]);
@@ -273,26 +396,7 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
             })
         })
         .collect();
-    // Beyond its ends a curve is level, and the plant without it may run far beyond them: nothing is known there.
-    let all: Vec<f64> = argument.values.concat();
-    let inside = |z: f64| match (&best.lead.curve, knots.first(), knots.last()) {
-        (Some(_), Some(&low), Some(&high)) => (low..=high).contains(&z),
-        _ => true,
-    };
-    let known = |column: &[f64]| -> Vec<f64> {
-        let pairs = column.iter().zip(&all).filter(|(_, z)| inside(**z));
-        pairs.map(|(value, _)| *value).collect()
-    };
-    let z = known(&all);
-    let wanted = DVector::from_vec(known(wanted.as_slice()));
-    let regress = |instances: Vec<Instance>| -> Option<Vec<Near>> {
-        let columns = evaluate(&instances, arguments, ground.recordings)?;
-        let each = instances.into_iter().zip(columns);
-        let near = each.filter_map(|(instance, column)| {
-            regression(&wanted, &z, &known(&column.concat()), instance)
-        });
-        Some(near.collect())
-    };
+    let regress = |instances| curved.regressions(instances, argument, ground.recordings);
     let mut found: Vec<Near> = Vec::new();
     take_nearer(&mut found, regress(instances)?);
     // How near a formula comes depends on its shapes more than the starts are close.
@@ -314,26 +418,15 @@ fn nearest(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Vec
     found.sort_by(|a, b| a.left.total_cmp(&b.left));
     let mut kept = [0; 2];
     found.retain(|near| {
-        let is_formula = near.term.id == FORMULA;
-        let (count, most) = match is_formula {
-            true => (&mut kept[0], FITTED),
-            false => (&mut kept[1], LISTED),
+        let (count, most) = match near.term.id {
+            FORMULA => (&mut kept[0], FITTED),
+            // A straight line is no curve; from far away its own fit may have ended elsewhere.
+            "linear" => return true,
+            _ => (&mut kept[1], LISTED),
         };
         *count += 1;
-        *count <= most
+        *count <= most && curved.is_part(near, best)
     });
-    // A straight line is no curve; from far away its own fit may have ended elsewhere.
-    if in_equation && let Some(term) = TERMS.iter().find(|term| term.id == "linear") {
-        let basis = DMatrix::from_fn(z.len(), 2, |i, j| [1.0, z[i]][j]);
-        let line = (basis.tr_mul(&basis).cholesky()).map(|n| n.solve(&basis.tr_mul(&wanted)));
-        found.extend(line.map(|line| Near {
-            term,
-            shapes: vec![],
-            strength: line[1],
-            slope: 0.0,
-            left: 0.0,
-        }));
-    }
     Some(found)
 }
 

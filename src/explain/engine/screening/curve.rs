@@ -1,6 +1,6 @@
 //! A function that nobody listed, as straight pieces between knots.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use crate::explain::engine::fitting::edit::{Place, literal};
 use crate::explain::engine::screening::path::{Entry, Hooked, Path, TOGETHER};
@@ -34,7 +34,7 @@ pub(crate) struct Curve {
 }
 
 /// Knots over the values of an argument.
-fn knots(argument: &Argument) -> Vec<f64> {
+pub(in crate::explain::engine) fn knots(argument: &Argument) -> Vec<f64> {
     let (low, high) = (argument.quantile(0.0), argument.quantile(1.0));
     let mut all: Vec<f64> = (0..KNOTS)
         .map(|i| {
@@ -193,22 +193,13 @@ pub(in crate::explain::engine) fn curves(
                 (column, products)
             })
             .unzip();
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let m = columns.len();
-        let mut normal = DMatrix::from_fn(m, m, |i, j| dot(&columns[i], &columns[j]));
-        let level = normal.diagonal().max();
-        (0..m).for_each(|i| normal[(i, i)] += RIDGE * level);
-        let right = DVector::from_fn(m, |i, _| dot(&columns[i], &projection.residual));
-        let values = normal.cholesky()?.solve(&right);
-        let statistic = values.dot(&right);
-        (statistic.is_finite() && m > 2).then(|| {
+        let regression = projection.regression(&columns, RIDGE)?;
+        let statistic = regression.decrease;
+        (statistic.is_finite() && knots.len() > 2).then(|| {
             let mut lead = Lead::untested(&CURVE, place);
             (lead.argument, lead.statistic) = (Some(at), statistic);
-            let each = products.into_iter().zip(&values).map(|(p, v)| p * *v);
-            lead.shift = each
-                .reduce(|a, b| a + b)
-                .map_or_else(Vec::new, |sum| projection.shift(&sum));
-            let values = values.iter().copied().collect();
+            lead.shift = projection.shift(&products, &regression);
+            let values = regression.values.iter().copied().collect();
             lead.curve = Some(Curve { knots, values });
             lead
         })

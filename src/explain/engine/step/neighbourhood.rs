@@ -36,9 +36,9 @@ pub(super) fn add_formulas(
     let Some(at) = close.max_by(|&a, &b| fitted[a].gain.total_cmp(&fitted[b].gain)) else {
         return;
     };
-    let mut better = formulas(&fitted[at], arguments, ground);
+    let mut better = formulas(&fitted[at], arguments, ground).unwrap_or_default();
     if let Some(finer) = refined_curve(&fitted[at], arguments, ground) {
-        better.extend(formulas(&finer, arguments, ground));
+        better.extend(formulas(&finer, arguments, ground).unwrap_or_default());
         fitted[at] = finer;
     }
     better.retain(|f| f.gain > fitted[at].gain + TIE.0);

@@ -65,6 +65,7 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
     let fourth = |v: VariableId| match spec.variable(v).unit_text.as_deref() {
         Some("K") => Some(format!("({}/100)^4", name(v))),
         Some("degC") => Some(format!("(({} + 273.15)/100)^4", name(v))),
+        Some("degF") => Some(format!("(({} + 459.67)/180)^4", name(v))),
         _ => None,
     };
     let warm: Vec<(VariableId, String)> = simple

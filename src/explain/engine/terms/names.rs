@@ -53,7 +53,7 @@ fn kind(spec: &ModelSpec, variables: &[VariableId]) -> Kind {
         || all(&|v| matches!(unit(v), "m" | "mm") && is_driven_only(spec, v))
     {
         Kind::Position
-    } else if all(&|v| matches!(unit(v), "K" | "degC")) {
+    } else if all(&|v| matches!(unit(v), "K" | "degC" | "degF")) {
         Kind::Temperature
     } else if all(&|v| spec.variable(v).unit_text.is_none()) {
         Kind::Unknown

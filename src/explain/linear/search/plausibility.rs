@@ -23,6 +23,10 @@ const SAME_PLANT: f64 = 1e-3;
 /// Probability of a larger shortfall against free parameters when the effect is the truth.
 const SHORT_OF_FULL: f64 = 0.05;
 
+/// A knee of friction that is narrower than this part of the typical speed is a corner: the plain law has the same free run, and
+/// the slope within the knee is that of rounding.
+const CORNER: f64 = 1e-3;
+
 /// Share of the samples that a threshold must leave on either side of it.
 const VISITED: f64 = 0.002;
 
@@ -197,6 +201,12 @@ pub(crate) fn sane(problem: &Problem, fit: &Fit) -> bool {
                 ("from", Unit::Second) => *v > start + 0.02 * length && *v < start + 0.98 * length,
                 ("limit" | "width", unit) => share_beyond(problem, fit, index, unit, *v)
                     .is_none_or(|beyond| (VISITED..=1.0 - VISITED).contains(&beyond)),
+                // An input that is never between the ends of its dead zone has an offset.
+                ("upper_end", _) => {
+                    let ends = shape[0]..=shape[1];
+                    let inside = share_of_input(problem, effect.channel, |u| ends.contains(&u));
+                    (VISITED..=1.0 - VISITED).contains(&inside)
+                }
                 ("stop_position", unit) => share_beyond(problem, fit, index, unit, *v)
                     .is_none_or(|beyond| (VISITED..=MOSTLY_FREE).contains(&beyond)),
                 ("frequency", _) if effect.definition.id == "periodic_disturbance" => {
@@ -207,6 +217,7 @@ pub(crate) fn sane(problem: &Problem, fit: &Fit) -> bool {
                 ("presliding_distance", _) => *v < 0.5 * travel(problem, fit, index),
                 ("yield_distance", _) => *v > RESOLVED_LOOP * travel(problem, fit, index),
                 ("breakaway_excess", _) => *v > BREAKAWAY,
+                ("knee_width", _) => *v > CORNER * speed_scale(problem, fit, index),
                 ("stribeck_velocity", _) => *v < 1.5 * speed_scale(problem, fit, index),
                 _ => true,
             })
@@ -215,18 +226,19 @@ pub(crate) fn sane(problem: &Problem, fit: &Fit) -> bool {
 
 /// Whether an input has one magnitude only: another gain for each sign then is an offset.
 fn two_levels(problem: &Problem, input: usize) -> bool {
-    let magnitudes = || {
-        problem
-            .data
-            .segments
-            .iter()
-            .flat_map(move |s| s.inputs[input].iter().map(|u| u.abs()))
+    let sizes = problem.data.segments.iter().flat_map(|s| &s.inputs[input]);
+    let most = sizes.fold(0.0_f64, |most, u| most.max(u.abs()));
+    let least = (1.0 - ONE_MAGNITUDE) * most;
+    share_of_input(problem, input, |u| u.abs() < least) <= VISITED
+}
+
+/// Share of the samples of an input for which something is so.
+fn share_of_input(problem: &Problem, input: usize, is_so: impl Fn(f64) -> bool) -> f64 {
+    let all = || {
+        let segments = problem.data.segments.iter();
+        segments.flat_map(move |s| s.inputs[input].iter())
     };
-    let most = magnitudes().fold(0.0, f64::max);
-    magnitudes()
-        .filter(|u| *u < (1.0 - ONE_MAGNITUDE) * most)
-        .count() as f64
-        <= VISITED * magnitudes().count() as f64
+    all().filter(|u| is_so(**u)).count() as f64 / all().count().max(1) as f64
 }
 
 /// Share of the samples that are beyond the threshold `v`, on the side where the effect acts.
@@ -270,15 +282,23 @@ fn share_beyond(problem: &Problem, fit: &Fit, index: usize, unit: Unit, v: f64) 
             .collect(),
         (_, Signal::Integral(_)) => return None,
     };
-    let beyond = values
-        .iter()
-        .filter(|x| match (two_sided, below) {
-            (true, _) => x.abs() > v,
-            (false, true) => **x < v,
-            (false, false) => **x > v,
-        })
-        .count() as f64;
-    Some(beyond / values.len().max(1) as f64)
+    let above = values.iter().filter(|x| **x > v).count();
+    let under = |limit: f64| values.iter().filter(|x| **x < limit).count();
+    let beyond = match (two_sided, below) {
+        // Limits and stops of which one is never reached are one, which has a form of its own.
+        (true, _) if effect.definition.variant.starts_with("both") => {
+            let (above, under) = (above, under(-v));
+            if above.min(under) == 0 {
+                0
+            } else {
+                above + under
+            }
+        }
+        (true, _) => above + under(-v),
+        (false, true) => under(v),
+        (false, false) => above,
+    };
+    Some(beyond as f64 / values.len().max(1) as f64)
 }
 
 /// Output `o` of every segment.
