@@ -70,10 +70,12 @@ impl Origins {
                 strays: false,
             };
         }
-        // A noise model that was fitted where physics is missing absorbs it: the same again under white noise.
+        // A noise model that was fitted where physics is missing absorbs it: the same again under white noise. A drift of a sensor that it
+        // absorbs takes the free run far away.
         let mut free_run = options.least_squares.then(|| fit.clone());
         if !options.least_squares {
-            free_run = study.least_squares(&fit.point).filter(|w| study.follows(w));
+            let useful = |white: &Fit| absorbed || study.follows(white);
+            free_run = study.least_squares(&fit.point).filter(useful);
             if let Some(white) = &free_run {
                 all.extend(screened(white, white).map(|s| origin(s, white)));
             }
