@@ -119,3 +119,48 @@ fn what_acts_in_one_of_two_recordings_is_found_there() {
         );
     }
 }
+
+/// Steam for the air of a room, which a controller sets by a sensor that drifts, and which arrives late. A noise model with a unit root
+/// takes up both: neither alone is seen beside it.
+#[test]
+fn a_drift_and_a_delay_in_a_loop_are_told_from_wandering_noise() {
+    const LATE: usize = 9;
+    let (mut normal, decay) = (noise(4), (-0.5f64 * 10.0 / 280.0).exp());
+    let mut x = 0.8;
+    let mut steam: Vec<f64> = Vec::new();
+    let mut recording = String::from("t [s],s [g/s],y [g/kg]\n");
+    for k in 0..1500 {
+        let t = 10.0 * k as f64;
+        let part = ((k / 37) as f64 * 0.618_033_988_7 + 0.13).fract();
+        let set = 0.6 + 2.4 * part;
+        let y = x + 3e-4 * t + 0.02 * normal();
+        steam.push((0.3 + 1.5 * (set - y)).clamp(0.0, 2.0));
+        writeln!(recording, "{t},{:.6},{y:.5}", steam[k]).unwrap();
+        let goal = 0.4 + 0.9 / 0.5 * steam[k.saturating_sub(LATE)];
+        x = goal + (x - goal) * decay;
+    }
+    let folder = Folder::new();
+    folder.text("log.csv", &recording);
+    folder.text(
+        "room.mo",
+        "model Room\n  parameter Real M(unit=\"kg\", min=250, max=295) = 265;\n  parameter Real e(unit=\"1\", min=0.8, max=1) = 0.85;\n  parameter Real m(unit=\"kg/s\", min=0.45, max=0.55) = 0.48;\n  input Real s(unit=\"g/s\");\n  output Real y(unit=\"g/kg\");\n  Real x(unit=\"g/kg\", start=0.8);\nequation\n  M*der(x) = e*s - m*(x - 0.4);\n  y = x;\nend Room;\n",
+    );
+    let said = folder.explained("log.csv", "room.mo", &[]);
+    let mut found = effects(&said);
+    found.sort_unstable();
+    assert_eq!(
+        found,
+        ["input_delay", "sensor_drift"],
+        "{}",
+        said["summary"]
+    );
+    for (id, name, truth, near) in [
+        ("sensor_drift", "sensor_drift_c", 3e-4, 3e-6),
+        ("input_delay", "input_delay_T", 90.0, 3.0),
+    ] {
+        let all = said["effects"].as_array().unwrap();
+        let effect = all.iter().find(|e| e["effect"] == id).unwrap();
+        let value = effect["parameters"][name]["value"].as_f64().unwrap();
+        assert!((value - truth).abs() < near, "{name} {value}");
+    }
+}

@@ -35,7 +35,7 @@ const FORMULAS: &[Term] = &[
     ),
     law("abs({z})^{p}", &[shape("p", POWERS, true)]),
     // Hyperbolas, of what stays away from zero: a load of constant power.
-    law("abs({z})^(-{p})", &[shape("p", POWERS, true)]),
+    law("abs({z})^(-{q})", &[shape("q", POWERS, true)]),
     law("exp({z}/{s})", &[shape("s", WIDTHS, true)]),
     law("exp(-{z}/{s})", &[shape("s", WIDTHS, true)]),
     // Through zero, where no parameter of the plant is the constant.
@@ -63,6 +63,9 @@ const FORMULAS: &[Term] = &[
         &[shape("o", MIDDLES, false), shape("s", WIDTHS, true)],
     ),
 ];
+/// Points at which a function is compared with a line, which it is where it is off by less than this part of what it varies by.
+const POINTS: usize = 33;
+const STRAIGHT: f64 = 0.02;
 /// Singular values below this part of the largest are rounding.
 const RANK: f64 = 1e-7;
 /// Formulas that are fitted to the recording: those nearest to the curve, and of the terms of the library those nearest to it.
@@ -101,6 +104,7 @@ pub(in crate::explain::engine) fn formulas(
     let study = ground.study.of(&rough, &options).ok()?;
     let curved = Curved::of(&fitted, &study, ground.study.parameters())?;
     let nearest = nearest(best, &curved, arguments, ground)?;
+    let argument = &arguments[best.lead.argument?];
     let found = nearest
         .par_iter()
         .filter_map(|near| {
@@ -111,18 +115,60 @@ pub(in crate::explain::engine) fn formulas(
                 |start_of: &Fitted| in_its_place(start_of, what, start, &refit, arguments, ground);
             from(&curved.with(&near.values)).or_else(|| from(&fitted))
         })
-        .filter(|f| turns_inside(f, arguments));
+        .filter(|f| f.shapes.is_empty() || is_curved(f, argument, ground.recordings));
     Some(found.collect())
 }
 
-/// Whether the middle of a formula is among the values of its argument: what rises or falls beyond them is a constant.
-fn turns_inside(fitted: &Fitted, arguments: &[Argument]) -> bool {
-    let shapes = fitted.lead.term.shapes.iter().zip(&fitted.shapes);
-    let mut middles = shapes.filter(|(shape, _)| shape.symbol == "o");
-    let argument = fitted.lead.argument.map(|a| &arguments[a]);
-    argument.is_none_or(|a| {
-        middles.all(|(_, middle)| (a.quantile(0.0)..=a.quantile(1.0)).contains(middle))
-    })
+/// Values of functions of one variable at these points.
+fn values_at(
+    points: &[f64],
+    mut instances: Vec<Instance>,
+    argument: &Argument,
+    recordings: &[PlantRecording],
+) -> Option<Vec<DVector<f64>>> {
+    let recording = PlantRecording {
+        inputs: vec![],
+        outputs: vec![vec![0.0; points.len()]],
+        ..recordings.first()?.clone()
+    };
+    let mut argument = argument.clone();
+    argument.set(vec![points.to_vec()], vec![points.to_vec()]);
+    for instance in &mut instances {
+        instance.argument = Some(0);
+    }
+    let values = evaluate(&instances, &[argument], &[recording])?;
+    let each = values.into_iter().map(|v| DVector::from_vec(v.concat()));
+    Some(each.collect())
+}
+
+/// Whether a fitted formula is not a simpler function over the values of its argument: a constant, because it rises or falls beyond
+/// them, or a straight line.
+fn is_curved(fitted: &Fitted, argument: &Argument, recordings: &[PlantRecording]) -> bool {
+    let (low, high) = (argument.quantile(0.0), argument.quantile(1.0));
+    let mut shapes = fitted.lead.term.shapes.iter().zip(&fitted.shapes);
+    if shapes.any(|(shape, value)| shape.symbol == "o" && !(low..=high).contains(value)) {
+        return false;
+    }
+    let points: Vec<f64> = (0..POINTS)
+        .map(|i| low + (high - low) * i as f64 / (POINTS - 1) as f64)
+        .collect();
+    let instance = Instance {
+        term: fitted.lead.term,
+        argument: None,
+        shapes: fitted.shapes.clone(),
+    };
+    let values = values_at(&points, vec![instance], argument, recordings);
+    let Some(values) = values.and_then(|all| all.into_iter().next()) else {
+        return true;
+    };
+    let line = DMatrix::from_fn(POINTS, 2, |i, j| [1.0, points[i]][j]);
+    let off = |of: &DMatrix<f64>| -> Option<f64> {
+        let fit = of.tr_mul(of).cholesky()?.solve(&of.tr_mul(&values));
+        Some((&values - of * fit).norm())
+    };
+    let level = off(&line.columns(0, 1).into_owned());
+    let parts = off(&line).zip(level);
+    parts.is_none_or(|(bent, varies)| bent > STRAIGHT * varies)
 }
 
 /// A function as a curve, and what the recording says of its values: how the sum of squares grows with them where all other numbers
@@ -239,7 +285,7 @@ impl<'a> Curved<'a> {
     /// Formulas as curves with the same knots, each the nearest to it, and what they leave.
     fn regressions(
         &self,
-        mut instances: Vec<Instance>,
+        instances: Vec<Instance>,
         argument: &Argument,
         recordings: &[PlantRecording],
     ) -> Option<Vec<Near>> {
@@ -251,21 +297,9 @@ impl<'a> Curved<'a> {
         let along: Vec<f64> = pieces.chain(knots.last().copied()).collect();
         let hats = DMatrix::from_fn(along.len(), knots.len(), |i, j| piece(knots, j, along[i]));
         let normal = hats.tr_mul(&hats).cholesky()?;
-        let first = recordings.first()?;
-        let dense = PlantRecording {
-            inputs: vec![],
-            outputs: vec![vec![0.0; along.len()]],
-            ..first.clone()
-        };
-        let mut argument = argument.clone();
-        argument.set(vec![along.clone()], vec![along]);
-        for instance in &mut instances {
-            instance.argument = Some(0);
-        }
-        let values = evaluate(&instances, &[argument], &[dense])?;
+        let values = values_at(&along, instances.clone(), argument, recordings)?;
         let each = instances.into_iter().zip(values);
         let near = each.filter_map(|(instance, values)| {
-            let values = DVector::from_vec(values.concat());
             self.regression(instance, normal.solve(&hats.tr_mul(&values)))
         });
         Some(near.collect())
@@ -279,22 +313,14 @@ fn as_curve(best: &Fitted, arguments: &[Argument], ground: &Ground) -> Option<Fi
         return None;
     }
     let knots = knots(&arguments[at]);
-    let mut argument = arguments[at].clone();
-    argument.set(vec![knots.clone()], vec![knots.clone()]);
-    let shapes = best.shapes.clone();
     let instance = Instance {
         term,
-        argument: Some(0),
-        shapes,
+        argument: None,
+        shapes: best.shapes.clone(),
     };
-    let recording = PlantRecording {
-        inputs: vec![],
-        outputs: vec![vec![0.0; knots.len()]],
-        ..ground.recordings.first()?.clone()
-    };
-    let values = evaluate(&[instance], &[argument], &[recording])?;
-    let values = values.concat().concat();
-    let values = values.iter().map(|v| best.strength() * v).collect();
+    let values = values_at(&knots, vec![instance], &arguments[at], ground.recordings)?;
+    let values = values.first()?.iter();
+    let values = values.map(|v| best.strength() * v).collect();
     let mut lead = Lead::untested(&CURVE, best.lead.place).at(best.lead.place, Some(at), &[]);
     lead.arrives = best.arrives();
     lead.curve = Some(Curve { knots, values });
@@ -402,8 +428,7 @@ fn nearest(
     // How near a formula comes depends on its shapes more than the starts are close.
     let mut step = FIRST_STEP;
     while step > LAST_STEP {
-        let formulas = found.iter().filter(|near| near.term.id == FORMULA);
-        let neighbours: Vec<Instance> = formulas
+        let neighbours: Vec<Instance> = (found.iter())
             .flat_map(|near| moved(near, step, argument.spread()))
             .map(|(term, shapes)| Instance {
                 term,

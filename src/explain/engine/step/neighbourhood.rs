@@ -41,7 +41,10 @@ pub(super) fn add_formulas(
         better.extend(formulas(&finer, arguments, ground).unwrap_or_default());
         fitted[at] = finer;
     }
-    better.retain(|f| f.gain > fitted[at].gain + TIE.0);
+    better.retain(|f| {
+        let id = named(&stage.plant.spec, f);
+        f.gain > fitted[at].gain + TIE.0 && stage.scope.allows(id)
+    });
     fitted.extend(better);
 }
 
