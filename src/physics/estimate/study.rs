@@ -267,6 +267,13 @@ impl<'a> Study<'a> {
         Some(fit.noise.deviance(&self.residual(fit)?, self.mask()))
     }
 
+    /// What a fit leaves, whitened, with outliers at the weight that its noise gives them.
+    pub(crate) fn weighted_residual(&self, fit: &Fit) -> Option<Vec<f64>> {
+        let whitened = fit.noise.whiten_kept(&self.residual(fit)?, self.mask());
+        let weighted = whitened.iter().map(|&e| fit.noise.weight(e) * e);
+        Some(weighted.collect())
+    }
+
     /// Whitened derivatives of the predictions by the free numbers that are not at a bound.
     pub(crate) fn derivatives(&self, fit: &Fit) -> Option<DMatrix<f64>> {
         let all = self.all_derivatives(fit)?;

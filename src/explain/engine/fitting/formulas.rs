@@ -8,6 +8,7 @@ use crate::explain::engine::fitting::edit::Place;
 use crate::explain::engine::fitting::fitted::{Fitted, searched, with_more};
 use crate::explain::engine::hypothesis::Ground;
 use crate::explain::engine::screening::curve::{Curve, knots, piece};
+use crate::explain::engine::screening::projection::Directions;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::{CURVE, TERMS};
@@ -66,8 +67,6 @@ const FORMULAS: &[Term] = &[
 /// Points at which a function is compared with a line, which it is where it is off by less than this part of what it varies by.
 const POINTS: usize = 33;
 const STRAIGHT: f64 = 0.02;
-/// Singular values below this part of the largest are rounding.
-const RANK: f64 = 1e-7;
 /// Formulas that are fitted to the recording: those nearest to the curve, and of the terms of the library those nearest to it.
 const FITTED: usize = 4;
 const LISTED: usize = 2;
@@ -141,8 +140,8 @@ fn values_at(
     Some(each.collect())
 }
 
-/// Whether a fitted formula is not a simpler function over the values of its argument: a constant, because it rises or falls beyond
-/// them, or a straight line.
+/// Whether a fitted formula bends over the values of its argument. One that rises or falls beyond them is a constant there, and others
+/// may be straight lines.
 fn is_curved(fitted: &Fitted, argument: &Argument, recordings: &[PlantRecording]) -> bool {
     let (low, high) = (argument.quantile(0.0), argument.quantile(1.0));
     let mut shapes = fitted.lead.term.shapes.iter().zip(&fitted.shapes);
@@ -178,6 +177,9 @@ struct Curved<'a> {
     fitted: &'a Fitted,
     study: &'a Study<'a>,
     curve: Curve,
+    /// Points along the curve, and what gives the values at the knots that are nearest to values there.
+    along: Vec<f64>,
+    to_knots: DMatrix<f64>,
     /// Root of the information of the values.
     root: DMatrix<f64>,
     /// What the root makes of the best values.
@@ -208,28 +210,21 @@ impl<'a> Curved<'a> {
         for (j, &i) in others.iter().enumerate() {
             of_others[(samples + j, j)] = 12.0_f64.sqrt() / reaches[i];
         }
-        let norms: Vec<f64> = of_others.column_iter().map(|c| c.norm()).collect();
-        for (mut column, norm) in of_others.column_iter_mut().zip(&norms) {
-            column /= norm.max(f64::MIN_POSITIVE);
-        }
-        let mut instead = DMatrix::zeros(others.len(), knots.len());
-        if !others.is_empty() {
-            let parts = of_others.svd(true, true);
-            instead = -parts.solve(&of_values, RANK).ok()?;
-            for (mut row, norm) in instead.row_iter_mut().zip(&norms) {
-                row /= norm.max(f64::MIN_POSITIVE);
-            }
-            let directions = parts.u?;
-            let kept = parts.singular_values.iter().enumerate();
-            let kept: Vec<usize> = kept.filter(|(_, s)| **s > RANK).map(|(i, _)| i).collect();
-            let directions = directions.select_columns(&kept);
-            of_values -= &directions * directions.tr_mul(&of_values);
-        }
-        let noise = &fitted.fit.noise;
-        let residual = noise.whiten_kept(&study.residual(&fitted.fit)?, study.mask());
-        let weighted = residual.iter().map(|&e| noise.weight(e) * e);
-        let residual = DVector::from_iterator(residual.len(), weighted);
+        let directions = Directions::of(of_others)?;
+        let instead = of_values.column_iter_mut().map(|mut column| {
+            let products = directions.off(column.as_mut_slice());
+            -&directions.numbers * products
+        });
+        let instead = DMatrix::from_columns(&instead.collect::<Vec<_>>());
+        let residual = DVector::from_vec(study.weighted_residual(&fitted.fit)?);
         let residual = residual.resize_vertically(rows, 0.0);
+        let pieces = knots.windows(2).flat_map(|k| {
+            let part = move |j: usize| k[0] + (k[1] - k[0]) * j as f64 / BETWEEN as f64;
+            (0..BETWEEN).map(part)
+        });
+        let along: Vec<f64> = pieces.chain(knots.last().copied()).collect();
+        let hats = DMatrix::from_fn(along.len(), knots.len(), |i, j| piece(&knots, j, along[i]));
+        let to_knots = hats.tr_mul(&hats).cholesky()?.solve(&hats.transpose());
         let parts = of_values.qr();
         let root = parts.r();
         let curve = Curve { knots, values };
@@ -239,6 +234,8 @@ impl<'a> Curved<'a> {
             fitted,
             study,
             curve,
+            along,
+            to_knots,
             root,
             wanted,
             others,
@@ -289,19 +286,10 @@ impl<'a> Curved<'a> {
         argument: &Argument,
         recordings: &[PlantRecording],
     ) -> Option<Vec<Near>> {
-        let knots = &self.curve.knots;
-        let pieces = knots.windows(2).flat_map(|k| {
-            let part = move |j: usize| k[0] + (k[1] - k[0]) * j as f64 / BETWEEN as f64;
-            (0..BETWEEN).map(part)
-        });
-        let along: Vec<f64> = pieces.chain(knots.last().copied()).collect();
-        let hats = DMatrix::from_fn(along.len(), knots.len(), |i, j| piece(knots, j, along[i]));
-        let normal = hats.tr_mul(&hats).cholesky()?;
-        let values = values_at(&along, instances.clone(), argument, recordings)?;
+        let values = values_at(&self.along, instances.clone(), argument, recordings)?;
         let each = instances.into_iter().zip(values);
-        let near = each.filter_map(|(instance, values)| {
-            self.regression(instance, normal.solve(&hats.tr_mul(&values)))
-        });
+        let near = each
+            .filter_map(|(instance, values)| self.regression(instance, &self.to_knots * values));
         Some(near.collect())
     }
 }

@@ -13,14 +13,14 @@ const LEAST_LEFT: f64 = 0.02;
 /// A number comes back from its bound where the residual's product with what it does there is larger, in standard deviations: less
 /// is the rounding of the fit.
 const STEEP: f64 = 0.01;
+/// Singular values of columns of length one below this are rounding.
+const RANK: f64 = 1e-7;
 /// Numbers in a signature.
 pub(in crate::explain::engine) const SIGNATURE: usize = 8;
 
 /// What the regression of the residual on terms needs.
 pub(in crate::explain::engine) struct Projection {
-    q: DMatrix<f64>,
-    /// What a product with `q` says of the numbers of the fit, a row for each.
-    numbers: DMatrix<f64>,
+    directions: Directions,
     inside: Vec<usize>,
     count: usize,
     pub residual: Vec<f64>,
@@ -29,6 +29,54 @@ pub(in crate::explain::engine) struct Projection {
     /// Normal equations of the ways back.
     normal: DMatrix<f64>,
     right: DVector<f64>,
+}
+
+/// Orthogonal directions of what numbers of a fit do.
+pub(in crate::explain::engine) struct Directions {
+    q: DMatrix<f64>,
+    /// What a product with each direction says of the numbers, a row for each number.
+    pub numbers: DMatrix<f64>,
+}
+
+impl Directions {
+    /// Of these columns, one for each number.
+    pub(in crate::explain::engine) fn of(mut columns: DMatrix<f64>) -> Option<Self> {
+        let mut norms = Vec::new();
+        for mut column in columns.column_iter_mut() {
+            let norm = column.norm();
+            if norm > 0.0 {
+                column /= norm;
+            }
+            norms.push(if norm > 0.0 { norm } else { f64::INFINITY });
+        }
+        // Nothing is fitted of a static plant without parameters: there is nothing to project off.
+        if columns.is_empty() {
+            let numbers = DMatrix::zeros(columns.ncols(), 0);
+            let q = DMatrix::zeros(columns.nrows(), 0);
+            return Some(Self { q, numbers });
+        }
+        let parts = columns.svd(true, true);
+        let (u, v) = (parts.u?, parts.v_t?);
+        let kept: Vec<usize> = (0..u.ncols())
+            .filter(|&i| parts.singular_values[i] > RANK)
+            .collect();
+        let numbers = DMatrix::from_fn(norms.len(), kept.len(), |i, j| {
+            v[(kept[j], i)] / parts.singular_values[kept[j]] / norms[i]
+        });
+        let q = u.select_columns(&kept);
+        Some(Self { q, numbers })
+    }
+
+    /// Projects them off a column; the products with each.
+    pub(in crate::explain::engine) fn off(&self, column: &mut [f64]) -> DVector<f64> {
+        let rows = self.q.nrows().max(1);
+        let products = self.q.as_slice().chunks_exact(rows).map(|q| {
+            let along = product(q, column);
+            column.iter_mut().zip(q).for_each(|(c, q)| *c -= along * q);
+            along
+        });
+        DVector::from_vec(products.collect())
+    }
 }
 
 /// What a number at a bound does on its way back, less what the others do.
@@ -60,37 +108,13 @@ impl Projection {
     pub(crate) fn new(study: &Study, fit: &Fit) -> Option<Self> {
         let all = study.all_derivatives(fit)?;
         let inside = study.inside(fit);
-        let mut q = all.select_columns(&inside);
-        let mut norms = Vec::new();
-        for mut column in q.column_iter_mut() {
-            let norm = column.norm();
-            if norm > 0.0 {
-                column /= norm;
-            }
-            norms.push(if norm > 0.0 { norm } else { f64::INFINITY });
-        }
-        // Nothing is fitted of a static plant without parameters: there is nothing to project off.
-        let (q, numbers) = if q.is_empty() {
-            (q, DMatrix::zeros(0, 0))
-        } else {
-            let parts = q.svd(true, true);
-            let (u, v) = (parts.u?, parts.v_t?);
-            let kept: Vec<usize> = (0..u.ncols())
-                .filter(|&i| parts.singular_values[i] > 1e-7)
-                .collect();
-            let numbers = DMatrix::from_fn(norms.len(), kept.len(), |i, j| {
-                v[(kept[j], i)] / parts.singular_values[kept[j]] / norms[i]
-            });
-            (u.select_columns(&kept), numbers)
-        };
-        let e = fit.noise.whiten_kept(&study.residual(fit)?, study.mask());
-        let mut residual: Vec<f64> = e.iter().map(|&e| fit.noise.weight(e) * e).collect();
+        let directions = Directions::of(all.select_columns(&inside))?;
+        let mut residual = study.weighted_residual(fit)?;
         let n = residual.len().max(1) as f64;
         let size = (residual.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
         residual.iter_mut().for_each(|e| *e /= size.max(1e-300));
         let mut projection = Self {
-            q,
-            numbers,
+            directions,
             inside,
             count: fit.point.len(),
             residual: vec![],
@@ -188,13 +212,7 @@ impl Projection {
 
     /// Projects parameters and initial states off; the products with their directions.
     pub(in crate::explain::engine) fn off(&self, column: &mut [f64]) -> DVector<f64> {
-        let rows = self.q.nrows().max(1);
-        let products = self.q.as_slice().chunks_exact(rows).map(|q| {
-            let along = product(q, column);
-            column.iter_mut().zip(q).for_each(|(c, q)| *c -= along * q);
-            along
-        });
-        DVector::from_vec(products.collect())
+        self.directions.off(column)
     }
 
     /// What the regression adds to each number of the fit beside columns that had these products.
@@ -207,7 +225,7 @@ impl Projection {
         let back = self.ways_back.iter().map(|way| &way.products);
         let all = columns.chain(back.zip(&regression.back));
         let sum = all.map(|(products, value)| products * *value);
-        let of_inside = &self.numbers * sum.reduce(|a, b| a + b).unwrap_or_default();
+        let of_inside = &self.directions.numbers * sum.reduce(|a, b| a + b).unwrap_or_default();
         let mut shift = vec![0.0; self.count];
         for (&i, s) in self.inside.iter().zip(&of_inside) {
             shift[i] = -s;
@@ -269,8 +287,7 @@ mod tests {
             change: -2.0,
         });
         let projection = Projection {
-            q: DMatrix::zeros(residual.len(), 0),
-            numbers: DMatrix::zeros(0, 0),
+            directions: Directions::of(DMatrix::zeros(residual.len(), 0)).unwrap(),
             inside: vec![],
             count: ways.len(),
             noise: vec![[0.0; SIGNATURE]; residual.len()],
