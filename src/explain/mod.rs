@@ -41,7 +41,7 @@ mod structures;
 pub use document::explain_error::ExplainError;
 pub use engine::hypothesis::{Hypothesis, HypothesisError, HypothesisErrorKind};
 pub use engine::scope::UnknownPlantEffect;
-pub use engine::terms::documentation::{Imitation, PLANT_EFFECTS, PlantEffect, plant_effect};
+pub use engine::terms::documentation::{Imitation, PlantEffect, plant_effect, plant_effects};
 pub use explain_recordings::{Options, explain};
 pub use explanation::{
     Alternative, AugmentedModel, AugmentedPlant, Curve, Detectable, EXPLANATION_FORMAT,

@@ -5,7 +5,7 @@ use super::fitting::fitted::{Fitted, TIE, tie_with_curve};
 use super::holdout::{CLOSE, held_out};
 use super::search::{Found, HALF_WAY, Question, forward};
 use super::step::Step;
-use super::terms::documentation::PLANT_EFFECTS;
+use super::terms::documentation::plant_effects;
 use super::terms::names::{family, named, special_case};
 use super::thresholds::{IMITATED, LEFT, NEEDED, SECOND, chance, is_spent};
 use crate::physics::estimate::{EstimateError, Fit, Study};
@@ -106,7 +106,7 @@ fn pairs(question: Question, found: &Found) -> Vec<Found> {
     // In place of a law two effects with names are looked for.
     let mut scope = question.scope.clone();
     if is_law && scope.only.is_empty() {
-        scope.only = PLANT_EFFECTS.iter().map(|e| e.id.to_owned()).collect();
+        scope.only = plant_effects().map(|e| e.id.to_owned()).collect();
     }
     let most = match is_law {
         true => FIRSTS_OF_A_LAW,

@@ -2,7 +2,7 @@
 
 use crate::explain::engine::hypothesis::Hypothesis;
 use crate::explain::engine::screening::screen::{Lead, Screen};
-use crate::explain::engine::terms::documentation::PLANT_EFFECTS;
+use crate::explain::engine::terms::documentation::plant_effects;
 use crate::explain::engine::terms::names::called;
 use crate::physics::{ModelSpec, nearest};
 
@@ -35,7 +35,7 @@ pub struct UnknownPlantEffect {
 impl Scope {
     /// Checks that every id is known.
     pub(crate) fn new(only: &[String], without: &[String]) -> Result<Self, UnknownPlantEffect> {
-        let ids = || PLANT_EFFECTS.iter().map(|e| e.id);
+        let ids = || plant_effects().map(|e| e.id);
         for (option, given) in [("--only", only), ("--without", without)] {
             if let Some(id) = given.iter().find(|id| !ids().any(|known| known == *id)) {
                 return Err(UnknownPlantEffect {

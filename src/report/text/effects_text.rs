@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::wrapped;
 use crate::explain::effects::{Definition, Mimic, library};
-use crate::explain::{PLANT_EFFECTS, PlantEffect, plant_effect};
+use crate::explain::{PlantEffect, plant_effect, plant_effects};
 use crate::physics::nearest;
 
 /// An id that no library has.
@@ -30,10 +30,7 @@ pub(crate) fn effects_text(id: Option<&str>) -> Result<String, UnknownId> {
     let of_plants = plant_effect(id);
     let others: Vec<&Definition> = library().filter(|d| d.id == id).collect();
     if of_plants.is_none() && others.is_empty() {
-        let ids = PLANT_EFFECTS
-            .iter()
-            .map(|e| e.id)
-            .chain(library().map(|d| d.id));
+        let ids = plant_effects().map(|e| e.id).chain(library().map(|d| d.id));
         return Err(UnknownId {
             id: id.to_owned(),
             nearest: nearest(id, ids),
@@ -54,13 +51,12 @@ pub(crate) fn effects_text(id: Option<&str>) -> Result<String, UnknownId> {
 
 fn list() -> String {
     let mut text = String::from("Plants in equations (explain --simulation plant.mo)\n");
-    let width = PLANT_EFFECTS
-        .iter()
+    let width = plant_effects()
         .map(|e| e.id.len())
         .chain(library().map(|d| d.id.len()))
         .max()
         .unwrap_or(0);
-    for effect in PLANT_EFFECTS {
+    for effect in plant_effects() {
         let _ = writeln!(text, "  {:width$}  {}", effect.id, effect.title);
     }
     text.push_str(
@@ -138,10 +134,7 @@ mod tests {
     #[test]
     fn every_effect_is_listed_and_described() {
         let all = effects_text(None).unwrap();
-        let ids = PLANT_EFFECTS
-            .iter()
-            .map(|e| e.id)
-            .chain(library().map(|d| d.id));
+        let ids = plant_effects().map(|e| e.id).chain(library().map(|d| d.id));
         for id in ids {
             assert!(all.contains(&format!("  {id} ")), "{id}");
             let one = effects_text(Some(id)).unwrap();

@@ -1,10 +1,12 @@
 //! What the ids of [`names`](super::names) mean: the library of plants in equations, for people. A test holds both together.
 
-mod effect_table;
+mod forces;
+mod heat_and_flow;
+mod inputs;
+mod loads_and_parameters;
+mod sensors;
 #[cfg(test)]
 mod tests;
-
-pub use effect_table::PLANT_EFFECTS;
 
 /// Other values of the text's own parameters, as an imitation of an effect.
 pub(crate) const PARAMETERS: &str = "parameters";
@@ -35,7 +37,51 @@ pub struct PlantEffect {
     pub imitations: &'static [Imitation],
 }
 
+/// All of them, by families.
+pub fn plant_effects() -> impl Iterator<Item = &'static PlantEffect> {
+    let families = [
+        forces::FORCES,
+        heat_and_flow::HEAT_AND_FLOW,
+        loads_and_parameters::LOADS_AND_PARAMETERS,
+        inputs::INPUTS,
+        sensors::SENSORS,
+    ];
+    families.into_iter().flatten()
+}
+
 /// The description of an id.
 pub fn plant_effect(id: &str) -> Option<&'static PlantEffect> {
-    PLANT_EFFECTS.iter().find(|e| e.id == id)
+    plant_effects().find(|e| e.id == id)
 }
+
+const fn like(effect: &'static str, experiment: &'static str) -> Imitation {
+    Imitation { effect, experiment }
+}
+
+const fn effect(
+    id: &'static str,
+    title: &'static str,
+    equation: &'static str,
+    enters: &'static str,
+    depends: &'static str,
+    imitations: &'static [Imitation],
+) -> PlantEffect {
+    PlantEffect {
+        id,
+        title,
+        equation,
+        enters,
+        depends,
+        imitations,
+    }
+}
+
+const ANY_EQUATION: &str = "the equation of a derivative or of an algebraic variable";
+const AN_INPUT: &str = "an input, on its way into every equation that uses it";
+const A_SENSOR: &str = "an output that copies a variable";
+const A_PARAMETER: &str = "a parameter, in every equation that uses it";
+const A_VELOCITY: &str = "a velocity: a variable in m/s or rad/s, or the derivative of another";
+const A_POSITION: &str = "a position: a variable in m, mm, rad or deg of a plant that moves";
+const ITSELF: &str = "the input itself";
+const SHOWN: &str = "what the sensor shows";
+const TIME: &str = "time";
