@@ -285,3 +285,60 @@ fn a_limit_with_a_soft_knee_is_a_saturation() {
     let limit = number(&said, 0, "input_saturation_L");
     assert!((limit - 1.6).abs() < 0.15, "{limit}");
 }
+
+/// A stretch of gravel brakes a vehicle for a while.
+#[test]
+fn a_load_that_ends_has_a_beginning_and_a_length() {
+    let force = levels(25, 20.0, 90.0);
+    let log = recorded(
+        "F [N],v [m/s]",
+        (1500, 1.0),
+        &[&force],
+        |x, u, t| {
+            let gravel = if t > 500.0 && t < 820.0 { 14.0 } else { 0.0 };
+            vec![(u[0] - 3.0 * x[0] - 8.0 - gravel) / 90.0]
+        },
+        (&[5.0], &[(0, 0.02)]),
+    );
+    let said = explained(
+        &Folder::new(),
+        &log,
+        "model Cart\n  parameter Real m(unit=\"kg\", min=80, max=100) = 93;\n  parameter Real d(unit=\"N.s/m\", min=2, max=4) = 2.8;\n  parameter Real r(unit=\"N\", min=5, max=12) = 9;\n  input Real F(unit=\"N\");\n  output Real y(unit=\"m/s\");\n  Real v(unit=\"m/s\", start=5);\nequation\n  m*der(v) = F - d*v - r;\n  y = v;\nend Cart;\n",
+    );
+    assert_eq!(effects(&said), ["load_step"], "{}", said["summary"]);
+    let (begins, lasts) = (
+        number(&said, 0, "load_step_t0"),
+        number(&said, 0, "load_step_T"),
+    );
+    assert!((begins - 500.0).abs() < 2.0, "{begins}");
+    assert!((lasts - 320.0).abs() < 3.0, "{lasts}");
+}
+
+/// A window that stands open for a while: the parameter is what it was before and after.
+#[test]
+fn a_parameter_that_comes_back_has_a_beginning_and_a_length() {
+    let heating = levels(30, 0.0, 2000.0);
+    let log = recorded(
+        "P [W],y [degC]",
+        (1400, 60.0),
+        &[&heating],
+        |x, u, t| {
+            let window = if t > 24_000.0 && t < 39_000.0 {
+                60.0
+            } else {
+                0.0
+            };
+            vec![(u[0] - (90.0 + window) * (x[0] - 4.0)) / 4.0e5]
+        },
+        (&[15.0], &[(0, 0.03)]),
+    );
+    let said = explained(
+        &Folder::new(),
+        &log,
+        "model Room\n  parameter Real C(unit=\"J/K\", min=3e5, max=5e5) = 4.3e5;\n  parameter Real h(unit=\"W/K\", min=70, max=110) = 84;\n  input Real P(unit=\"W\");\n  output Real y(unit=\"degC\");\n  Real T(unit=\"degC\", start=15);\nequation\n  C*der(T) = P - h*(T - 4);\n  y = T;\nend Room;\n",
+    );
+    assert_eq!(effects(&said), ["parameter_change"], "{}", said["summary"]);
+    assert_eq!(said["effects"][0]["enters"], "h");
+    let lasts = number(&said, 0, "parameter_change_T");
+    assert!((lasts - 15_000.0).abs() < 200.0, "{lasts}");
+}

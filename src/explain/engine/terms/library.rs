@@ -11,6 +11,9 @@ pub(super) const TIMES: &[f64] = &[
     0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85,
     0.9, 0.95,
 ];
+/// What begins, lasts and ends: a stretch of another road, a door that stands open.
+const FOR_A_WHILE: &str = "(if time > {t0} and time < {t0} + {T} then 1.0 else 0.0)";
+const WHILE: Shape = shape("T", Starts::Length(&[0.05, 0.1, 0.2, 0.4]), true);
 
 use Needs::{
     AboutZero, AlongPath, Angle, Anything, BothSigns, Difference, Directed, Driven, Integrated,
@@ -338,6 +341,7 @@ pub(crate) const TERMS: &[Term] = &[
         "(if time > {t0} then 1.0 else 0.0)",
         &[STEP],
     ),
+    curve("load_step", Equation, Time, FOR_A_WHILE, &[STEP, WHILE]),
     curve(
         "periodic",
         Equation,
@@ -375,6 +379,13 @@ pub(crate) const TERMS: &[Term] = &[
         Time,
         "(if time > {t0} then 1.0 else 0.0)",
         &[STEP],
+    ),
+    curve(
+        "parameter_step",
+        Parameter,
+        Time,
+        FOR_A_WHILE,
+        &[STEP, WHILE],
     ),
     curve("parameter_ramp", Parameter, Time, "time", &[]),
     Term {

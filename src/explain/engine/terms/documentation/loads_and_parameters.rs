@@ -55,8 +55,8 @@ pub(super) const LOADS_AND_PARAMETERS: &[PlantEffect] = &[
     ),
     effect(
         "parameter_change",
-        "parameter that changes at a time, or slowly",
-        "p becomes p + c from the time t0 on, or p + c*time",
+        "parameter that changes at a time, for a while, or slowly",
+        "p becomes p + c from the time t0 on, for good or for T, or p + c*time",
         A_PARAMETER,
         TIME,
         &[
