@@ -193,7 +193,18 @@ impl<'a, const M: usize> Field<'a, M> {
         }
     }
 
-    /// Derivatives of the states at an instant; the frame then holds all values.
+    /// Derivatives of the states at a sample; the frame then holds all values.
+    pub(crate) fn evaluate_all(
+        &mut self,
+        time: &Dual<M>,
+        x: &[Dual<M>],
+        derivative: &mut [Dual<M>],
+    ) {
+        self.evaluate(time, x, derivative);
+        self.tape.run_outputs(&mut self.frame);
+    }
+
+    /// Derivatives of the states at an instant; the frame then holds the values that they use.
     pub(crate) fn evaluate(&mut self, time: &Dual<M>, x: &[Dual<M>], derivative: &mut [Dual<M>]) {
         self.place(time);
         for (&slot, x) in self.tape.states.iter().zip(x) {
@@ -231,7 +242,7 @@ impl<'a, const M: usize> Field<'a, M> {
         jacobian: &mut [f64],
     ) {
         let tape = self.tape;
-        self.linearise_slots(time, x, &tape.derivatives, derivative, jacobian);
+        self.linearise_slots(time, x, (&tape.derivatives, false), derivative, jacobian);
     }
 
     /// Outputs and their Jacobian by the states, likewise.
@@ -243,14 +254,14 @@ impl<'a, const M: usize> Field<'a, M> {
         jacobian: &mut [f64],
     ) {
         let tape = self.tape;
-        self.linearise_slots(time, x, &tape.outputs, value, jacobian);
+        self.linearise_slots(time, x, (&tape.outputs, true), value, jacobian);
     }
 
     fn linearise_slots(
         &mut self,
         time: &Dual<M>,
         x: &[f64],
-        slots: &[usize],
+        (slots, shown): (&[usize], bool),
         value: &mut [f64],
         jacobian: &mut [f64],
     ) {
@@ -280,6 +291,9 @@ impl<'a, const M: usize> Field<'a, M> {
                 frame.slot[slot] = dual;
             }
             tape.run_states(frame);
+            if shown {
+                tape.run_outputs(frame);
+            }
             for (row, &slot) in slots.iter().enumerate() {
                 value[row] = frame.slot[slot].value;
                 for column in first..(first + LANES).min(n) {

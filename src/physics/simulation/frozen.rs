@@ -177,7 +177,7 @@ impl Plant {
                     for (to, &x) in dual.iter_mut().zip(x) {
                         *to = Dual::constant(x);
                     }
-                    field.evaluate(&Dual::constant(time), &dual, &mut rates);
+                    field.evaluate_all(&Dual::constant(time), &dual, &mut rates);
                 };
                 for k in 0..excitation.length {
                     let now = excitation.time(k);

@@ -32,7 +32,7 @@ impl<const M: usize> Integrator<'_, M> {
         self.field.begin(k);
         self.field.part(None);
         let now = Dual::constant(excitation.time(k));
-        self.field.evaluate(&now, &self.x, &mut self.first);
+        self.field.evaluate_all(&now, &self.x, &mut self.first);
         if k == 0 {
             self.field.remember(now.value);
         }

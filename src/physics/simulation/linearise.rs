@@ -113,6 +113,7 @@ impl Lineariser {
                     frame.slot[delay.result] = frame.slot[delay.value];
                 }
             }
+            tape.run_outputs(frame);
             for (row, &slot) in tape.derivatives.iter().chain(&tape.outputs).enumerate() {
                 for column in first..(first + LANES).min(n + m) {
                     whole[(row, column)] = frame.slot[slot].slope[column - first];

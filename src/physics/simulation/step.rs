@@ -1,12 +1,72 @@
-//! One step in time: the classical Runge-Kutta method, and a diagonally implicit one for stiff equations.
+//! One step in time: the explicit method of Dormand and Prince, and a diagonally implicit one for stiff equations.
 //!
-//! Both carry slopes through the step, which so are the exact slopes of what is computed. The implicit method is L-stable, of
-//! order 4 with 5 stages (Hairer and Wanner, *Solving Ordinary Differential Equations II*, table IV.6.5); the slopes of a stage
-//! follow from its equation by one solution with the matrix of the last Newton iteration.
+//! Both carry slopes through the step, which so are the exact slopes of what is computed. The explicit method is of order 5 with an
+//! embedded result of order 4 (Hairer, Norsett and Wanner, *Solving Ordinary Differential Equations I*, table II.5.2). The implicit method
+//! is L-stable, of order 4 with 5 stages (Hairer and Wanner, *Solving Ordinary Differential Equations II*, table IV.6.5); the slopes of a
+//! stage follow from its equation by one solution with the matrix of the last Newton iteration.
+
+use nalgebra::Complex;
 
 use super::dense::Factors;
 use super::dual::Dual;
 use super::field::Field;
+
+/// Instants of the stages of the explicit method after the first, as fractions of the step.
+const EXPLICIT_INSTANTS: [f64; 5] = [0.2, 0.3, 0.8, 8.0 / 9.0, 1.0];
+/// Weights of the stages before, by rows.
+const EXPLICIT_WEIGHTS: [&[f64]; 5] = [
+    &[0.2],
+    &[3.0 / 40.0, 9.0 / 40.0],
+    &[44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0],
+    &[
+        19372.0 / 6561.0,
+        -25360.0 / 2187.0,
+        64448.0 / 6561.0,
+        -212.0 / 729.0,
+    ],
+    &[
+        9017.0 / 3168.0,
+        -355.0 / 33.0,
+        46732.0 / 5247.0,
+        49.0 / 176.0,
+        -5103.0 / 18656.0,
+    ],
+];
+/// Weights of the result.
+const EXPLICIT_RESULT: [f64; 6] = [
+    35.0 / 384.0,
+    0.0,
+    500.0 / 1113.0,
+    125.0 / 192.0,
+    -2187.0 / 6784.0,
+    11.0 / 84.0,
+];
+/// Difference of the weights of the result and of the embedded result of order 4; the last is that of the derivatives at the end.
+const EXPLICIT_DIFFERENCE: [f64; 7] = [
+    71.0 / 57600.0,
+    0.0,
+    -71.0 / 16695.0,
+    71.0 / 1920.0,
+    -17253.0 / 339200.0,
+    22.0 / 525.0,
+    -1.0 / 40.0,
+];
+/// Coefficients of its growth in a step of `der(x) = rate*x`, by powers of the step times the rate.
+const GROWTH: [f64; 7] = [
+    1.0,
+    1.0,
+    1.0 / 2.0,
+    1.0 / 6.0,
+    1.0 / 24.0,
+    1.0 / 120.0,
+    1.0 / 600.0,
+];
+
+/// What a mode grows by in an explicit step, of the step times its rate.
+pub(super) fn growth(z: Complex<f64>) -> Complex<f64> {
+    let powers = GROWTH.iter().rev();
+    powers.fold(Complex::new(0.0, 0.0), |sum, k| sum * z + k)
+}
 
 /// Diagonal of the implicit method.
 const GAMMA: f64 = 0.25;
@@ -57,22 +117,38 @@ impl<const M: usize> Stages<M> {
         }
     }
 
-    /// Derivatives at the last stage of the explicit method: at the end of the step, but for an error of order 3.
-    pub(crate) fn last_explicit(&self) -> &[Dual<M>] {
-        &self.slopes[2]
-    }
-
-    /// Length of the explicit step times the fastest rate that its stages show: `2 |k3 - k2| / |k2 - k1|`, each state in units
-    /// of `scale`; NaN where nothing moves. Above 2.8 the method is unstable, even where the step is at rest and shows no error:
-    /// its slopes would grow.
-    pub(crate) fn stiffness(&self, first: &[Dual<M>], scale: &[f64]) -> f64 {
-        let [k2, k3, ..] = &self.slopes;
+    /// Length of the explicit step times the fastest rate that its last stages show (Hairer and Wanner, equation IV.2.11), each state in
+    /// units of `scale`; NaN where nothing moves. Above 3.3 the method is unstable, even where the step is at rest and shows no error: its
+    /// slopes would grow.
+    pub(crate) fn stiffness(
+        &self,
+        length: f64,
+        result: &[Dual<M>],
+        end: &[Dual<M>],
+        scale: &[f64],
+    ) -> f64 {
         let (mut change, mut base) = (0.0, 0.0);
         for (i, scale) in scale.iter().enumerate() {
-            change += ((k3[i].value - k2[i].value) / scale).powi(2);
-            base += ((k2[i].value - first[i].value) / scale).powi(2);
+            change += ((end[i].value - self.slopes[4][i].value) / scale).powi(2);
+            base += ((result[i].value - self.point[i].value) / scale).powi(2);
         }
-        2.0 * (change / base).sqrt()
+        length * (change / base).sqrt()
+    }
+
+    /// Difference of the explicit step and the embedded one of order 4; `first` and `end` are the derivatives at its ends.
+    pub(crate) fn explicit_error(
+        &self,
+        length: f64,
+        first: &[Dual<M>],
+        end: &[Dual<M>],
+        error: &mut [f64],
+    ) {
+        let [of_first, between @ .., of_end] = &EXPLICIT_DIFFERENCE;
+        for (i, e) in error.iter_mut().enumerate() {
+            let between = between.iter().zip(&self.slopes);
+            let between = between.map(|(d, k)| d * k[i].value).sum::<f64>();
+            *e = length * (of_first * first[i].value + between + of_end * end[i].value);
+        }
     }
 
     /// Difference of the implicit step and the embedded one of order 3, smoothed by the matrix of the last stage, which keeps
@@ -85,7 +161,7 @@ impl<const M: usize> Stages<M> {
         self.newton.factors.solve(error);
     }
 
-    /// The classical method; `first` is the derivative at the start.
+    /// The explicit method; `first` is the derivative at the start.
     pub(crate) fn explicit(
         &mut self,
         field: &mut Field<M>,
@@ -96,35 +172,13 @@ impl<const M: usize> Stages<M> {
         result: &mut [Dual<M>],
     ) {
         let one = Dual::constant(1.0);
-        let varies = length.slope.iter().any(|&s| s != 0.0);
-        let add = |to: &Dual<M>, factor: f64, k: &Dual<M>| {
-            if varies {
-                to.plus_product(factor, length, k)
-            } else {
-                to.plus(factor * length.value, k)
-            }
-        };
-        let instant = |part: f64| time.plus_product(part, length, &one);
-        let [k2, k3, k4, ..] = &mut self.slopes;
-        for (p, (x, k)) in self.point.iter_mut().zip(x.iter().zip(first)) {
-            *p = add(x, 0.5, k);
+        for (stage, weights) in EXPLICIT_WEIGHTS.iter().enumerate() {
+            let (known, unknown) = self.slopes.split_at_mut(stage);
+            combine(length, x, (first, known), weights, &mut self.point);
+            let instant = time.plus_product(EXPLICIT_INSTANTS[stage], length, &one);
+            field.evaluate(&instant, &self.point, &mut unknown[0]);
         }
-        field.evaluate(&instant(0.5), &self.point, k2);
-        for (p, (x, k)) in self.point.iter_mut().zip(x.iter().zip(&*k2)) {
-            *p = add(x, 0.5, k);
-        }
-        field.evaluate(&instant(0.5), &self.point, k3);
-        for (p, (x, k)) in self.point.iter_mut().zip(x.iter().zip(&*k3)) {
-            *p = add(x, 1.0, k);
-        }
-        field.evaluate(&instant(1.0), &self.point, k4);
-        for (i, r) in result.iter_mut().enumerate() {
-            let sum = first[i]
-                .plus(2.0, &k2[i])
-                .plus(2.0, &k3[i])
-                .plus(1.0, &k4[i]);
-            *r = add(&x[i], 1.0 / 6.0, &sum);
-        }
+        combine(length, x, (first, &self.slopes), &EXPLICIT_RESULT, result);
     }
 
     #[allow(
@@ -211,6 +265,30 @@ impl<const M: usize> Stages<M> {
             *r = self.base[i].plus_product(GAMMA, length, &self.slopes[4][i]);
         }
         true
+    }
+}
+
+/// `x` and a combination of stages, the first of which stands apart.
+#[inline(always)]
+fn combine<const M: usize>(
+    length: &Dual<M>,
+    x: &[Dual<M>],
+    (first, stages): (&[Dual<M>], &[Vec<Dual<M>>]),
+    weights: &[f64],
+    into: &mut [Dual<M>],
+) {
+    let Some((of_first, others)) = weights.split_first() else {
+        return;
+    };
+    let varies = length.slope.iter().any(|&s| s != 0.0);
+    for (i, to) in into.iter_mut().enumerate() {
+        let start = Dual::constant(0.0).plus(*of_first, &first[i]);
+        let stages = others.iter().zip(stages);
+        let sum = stages.fold(start, |sum, (weight, k)| sum.plus(*weight, &k[i]));
+        *to = match varies {
+            true => x[i].plus_product(1.0, length, &sum),
+            false => x[i].plus(length.value, &sum),
+        };
     }
 }
 
@@ -352,5 +430,40 @@ impl<const M: usize> Newton<M> {
             last = Some(change);
         }
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Conditions of order 1 and 2 of the stages and 5 of a linear equation, and the growth that these weights give it.
+    #[test]
+    fn weights_of_the_explicit_method_fulfil_their_conditions() {
+        for (weights, instant) in EXPLICIT_WEIGHTS.iter().zip(EXPLICIT_INSTANTS) {
+            assert!((weights.iter().sum::<f64>() - instant).abs() < 1e-14);
+        }
+        assert!(EXPLICIT_DIFFERENCE.iter().sum::<f64>().abs() < 1e-15);
+        // Stages of der(x) = z*x from x = 1, as polynomials in z.
+        let mut stages = vec![vec![1.0]];
+        let sum = |weights: &[f64], stages: &[Vec<f64>]| {
+            let mut powers = vec![0.0; 7];
+            powers[0] = 1.0;
+            for (weight, stage) in weights.iter().zip(stages) {
+                for (power, c) in stage.iter().enumerate() {
+                    powers[power + 1] += weight * c;
+                }
+            }
+            powers
+        };
+        for weights in EXPLICIT_WEIGHTS {
+            let mut stage = sum(weights, &stages);
+            stage.truncate(6);
+            stages.push(stage);
+        }
+        let growth = sum(&EXPLICIT_RESULT, &stages);
+        for (found, expected) in growth.iter().zip(GROWTH) {
+            assert!((found - expected).abs() < 1e-14, "{growth:?}");
+        }
     }
 }

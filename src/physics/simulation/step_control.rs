@@ -1,7 +1,7 @@
 //! The steps of a run, chosen by their error.
 //!
-//! Steps are dyadic parts of a sample (or of a part of it between two jumps of a delayed input), each accepted when one step and
-//! two half steps agree. Where the explicit method needs many steps in a sample, the implicit one takes over. Across a switch
+//! Steps are dyadic parts of a sample (or of a part of it between two jumps of a delayed input), each accepted when its result and an
+//! embedded one of lower order agree. Where the explicit method needs many steps in a sample, the implicit one takes over. Across a switch
 //! (`sign`, a comparison) steps are shortened until they resolve its ramp.
 
 use nalgebra::{Complex, DMatrix, DVector, Schur};
@@ -11,7 +11,7 @@ use super::field::Field;
 use super::integrator::{FINEST, IMPLICIT, Integrator};
 use super::plant::{Plant, SimulationError};
 use super::run::{Excitation, Plan};
-use super::step::Accuracy;
+use super::step::{Accuracy, growth};
 use super::tape::{SwitchSlots, Tape};
 
 /// Error of one step that is allowed, as a part of how far a state has moved so far. Errors add up along the recording; with
@@ -21,13 +21,8 @@ pub(super) const STEP_ACCURACY: f64 = 1e-8;
 const RARE: u8 = 8;
 /// ... but not more often than this.
 const MOST_DOUBLED: u8 = 4;
-/// The embedded result of the implicit method is of one order less than the step: its error may be so many times larger.
+/// The embedded results are of one order less than the steps: their errors may be so many times larger.
 const EMBEDDED: f64 = 10.0;
-/// A step whose halves agree to this part of what is allowed says how far they need not be computed.
-const TRUSTED: f64 = 0.5;
-/// No larger difference, as a multiple of the error that is allowed, is trusted: across a switch two half steps may agree with
-/// a step by chance, and what follows would slide over it in steps that are not stable.
-const MOST_TRUSTED: f64 = 100.0;
 /// A state that hardly moves about a large value is computed to this part of [`STEP_ACCURACY`] of that value.
 const OF_LEVEL: f64 = 1e-5;
 /// Error of a step from rest, as a part of the step: what starts to move has no scale yet.
@@ -38,12 +33,17 @@ const FORESEEN: usize = 4;
 const ROUGH: u8 = 8;
 /// The explicit method gives way to the implicit one where it would need `2^STIFF` steps in a sample.
 const STIFF: u8 = 7;
-/// Step times rate up to which the explicit method is stable (2.8 for rates that are real).
-const STABLE: f64 = 2.5;
+/// Step times rate up to which the explicit method is stable: for rates that are real, and in all directions.
+const STABLE: f64 = 3.25;
+const STABLE_IN_ALL: f64 = 0.99;
+/// A Jacobian that differs by this part from another has its rates.
+const SAME_RATES: f64 = 0.05;
 /// Where the explicit method is far from its limit, its rates are computed in every so many samples only.
 const SELDOM: usize = 8;
 /// ... which is below this part of the limit.
 const FAR: f64 = 0.25;
+/// Squares of a Jacobian that bound its eigenvalues.
+const SQUARINGS: i32 = 3;
 /// Iterations for the eigenvalues of a Jacobian.
 const EIGENVALUES: usize = 1000;
 /// An implicit step costs about as much as so many explicit ones.
@@ -82,22 +82,16 @@ pub(super) struct StepControl<'p> {
     error: Vec<f64>,
     /// Error of a step as a part of how far a state has moved.
     tolerance: f64,
-    /// Difference of the derivatives at the end of a step, by the last stage and by the result, up to which two half steps have
-    /// agreed with it: steps below it are accepted without them.
-    trusted: f64,
-    /// Error of the step that was trusted last, as a part of that difference.
-    per_indication: f64,
-    /// Rates of the modes that decay and that the explicit method may not damp; none where no step of a sample is too long.
-    decaying: Vec<Complex<f64>>,
+    /// No mode is faster than this, in 1/s; the Jacobian that says so, and the rates of its modes that decay once they are needed.
+    fastest: f64,
+    examined: Vec<f64>,
+    decaying: Option<Vec<Complex<f64>>>,
     /// Sample at which the rates are computed again.
     examined_again: usize,
     /// Largest argument of each switch so far.
     largest: Vec<f64>,
     /// True when the ramps are to be found.
     rough: bool,
-    middle: Vec<Dual<0>>,
-    half: Vec<Dual<0>>,
-    slope: Vec<Dual<0>>,
     end: Vec<Dual<0>>,
     rates: Vec<f64>,
     jacobian: Vec<f64>,
@@ -124,6 +118,27 @@ fn norm(matrix: &[f64], scale: &[f64]) -> f64 {
             .sum::<f64>()
     })
     .fold(0.0, f64::max)
+}
+
+/// A bound of the eigenvalues of a matrix: `|A^8|^(1/8)`, which is close to the largest (Gelfand's formula).
+fn fastest_rate(matrix: &[f64], scale: &[f64]) -> f64 {
+    let n = scale.len();
+    let size = norm(matrix, scale);
+    if size == 0.0 || !size.is_finite() {
+        return size;
+    }
+    let mut power: Vec<f64> = matrix.iter().map(|a| a / size).collect();
+    let mut square = vec![0.0; n * n];
+    for _ in 0..SQUARINGS {
+        for (to, row) in square.chunks_mut(n).zip(power.chunks(n)) {
+            to.fill(0.0);
+            for (factor, b) in row.iter().zip(power.chunks(n)) {
+                to.iter_mut().zip(b).for_each(|(to, b)| *to += factor * b);
+            }
+        }
+        std::mem::swap(&mut power, &mut square);
+    }
+    size * norm(&power, scale).powf(0.5f64.powi(SQUARINGS))
 }
 
 /// How an attempt at a step ended.
@@ -160,15 +175,12 @@ impl<'p> StepControl<'p> {
             allowed: vec![0.0; n],
             error: vec![0.0; n],
             tolerance: plant.accuracy,
-            trusted: 0.0,
-            per_indication: 0.0,
-            decaying: Vec::new(),
+            fastest: 0.0,
+            examined: Vec::new(),
+            decaying: None,
             examined_again: 0,
             largest: vec![0.0; plant.tape.switches.len()],
             rough,
-            middle: room.clone(),
-            half: room.clone(),
-            slope: room.clone(),
             end: room,
             rates: vec![0.0; n],
             jacobian: vec![0.0; n * n],
@@ -276,36 +288,46 @@ impl<'p> StepControl<'p> {
     /// Finds the rates that limit an explicit step. The stages of a step do not show those of modes at rest, whose values stay there by
     /// chance and whose slopes grow.
     fn examine(&mut self, integrator: &mut Integrator<0>, time: f64, sample_time: f64) {
-        let n = integrator.x.len();
         self.allow(integrator, 0);
         let x: Vec<f64> = integrator.x.iter().map(|x| x.value).collect();
         let time = Dual::constant(time);
         (integrator.field).linearise(&time, &x, &mut self.rates, &mut self.jacobian);
-        self.decaying.clear();
-        let fastest = sample_time * norm(&self.jacobian, &self.allowed);
-        let seldom = if fastest < FAR * STABLE { SELDOM } else { 1 };
-        self.examined_again = self.samples - 1 + seldom;
-        if fastest > STABLE && fastest.is_finite() {
-            let jacobian = DMatrix::from_row_slice(n, n, &self.jacobian);
-            if let Some(schur) = Schur::try_new(jacobian, f64::EPSILON, EIGENVALUES) {
-                let rates = schur.complex_eigenvalues();
-                let decaying = rates.iter().filter(|rate| rate.re < 0.0);
-                self.decaying.extend(decaying);
-            }
+        if !self.has_the_same_rates() {
+            let fastest = fastest_rate(&self.jacobian, &self.allowed);
+            self.fastest = if fastest.is_finite() { fastest } else { 0.0 };
+            self.examined.clone_from(&self.jacobian);
+            self.decaying = None;
         }
+        let far = sample_time * self.fastest < FAR * STABLE_IN_ALL;
+        self.examined_again = self.samples - 1 + if far { SELDOM } else { 1 };
+    }
+
+    /// Whether the Jacobian is that which was examined last, or close to it.
+    fn has_the_same_rates(&self) -> bool {
+        let n = self.allowed.len();
+        if self.examined.len() != n * n {
+            return false;
+        }
+        let both = self.jacobian.iter().zip(&self.examined);
+        let change: Vec<f64> = both.map(|(now, before)| now - before).collect();
+        norm(&change, &self.allowed) <= SAME_RATES * norm(&self.examined, &self.allowed)
     }
 
     /// Whether an explicit step damps every mode that decays.
-    fn damps(&self, step: f64) -> bool {
-        let growth = |z: Complex<f64>| {
-            let powers = (1..=4).rev();
-            powers.fold(Complex::new(1.0, 0.0), |sum, k| {
-                sum * z / f64::from(k) + 1.0
-            })
-        };
-        self.decaying
-            .iter()
-            .all(|rate| growth(rate * step).norm() <= 1.0)
+    fn damps(&mut self, step: f64) -> bool {
+        if step * self.fastest <= STABLE_IN_ALL {
+            return true;
+        }
+        let n = self.allowed.len();
+        let decaying = self.decaying.get_or_insert_with(|| {
+            let jacobian = DMatrix::from_row_slice(n, n, &self.examined);
+            let schur = Schur::try_new(jacobian, f64::EPSILON, EIGENVALUES);
+            let rates = schur.map(|schur| schur.complex_eigenvalues());
+            let rates = rates.iter().flat_map(|rates| rates.iter().copied());
+            rates.filter(|rate| rate.re < 0.0).collect()
+        });
+        let mut rates = decaying.iter();
+        rates.all(|&rate| growth(rate * step).norm() <= 1.0)
     }
 
     fn part(
@@ -397,11 +419,7 @@ impl<'p> StepControl<'p> {
         step: f64,
         depth: u8,
     ) -> Attempt {
-        let (whole, half, one) = (
-            Dual::constant(step),
-            Dual::constant(0.5 * step),
-            Dual::constant(1.0),
-        );
+        let (whole, one) = (Dual::constant(step), Dual::constant(1.0));
         self.allow(integrator, depth);
         let Integrator {
             field,
@@ -431,10 +449,7 @@ impl<'p> StepControl<'p> {
             stages.explicit(field, time, &whole, x, first, next);
             field.evaluate(&end, next, &mut self.end);
             self.allow_moved(x, next);
-            for i in 0..x.len() {
-                self.error[i] = step * (stages.last_explicit()[i].value - self.end[i].value);
-            }
-            let mut stiffness = stages.stiffness(first, &self.allowed);
+            let mut stiffness = stages.stiffness(step, next, &self.end, &self.allowed);
             let switches = self.plant.tape.switches.iter().enumerate();
             let on_a_ramp = switches
                 .filter(|(_, s)| s.moves)
@@ -452,38 +467,10 @@ impl<'p> StepControl<'p> {
             if stiffness > STABLE {
                 return Attempt::Error(f64::INFINITY);
             }
-            let indication = worst(&self.error, &self.allowed);
-            if indication <= self.trusted {
-                indication * self.per_indication
-            } else {
-                stages.explicit(field, time, &half, x, first, &mut self.middle);
-                let middle = time.plus(0.5 * step, &one);
-                field.evaluate(&middle, &self.middle, &mut self.slope);
-                stages.explicit(
-                    field,
-                    &middle,
-                    &half,
-                    &self.middle,
-                    &self.slope,
-                    &mut self.half,
-                );
-                for (e, (a, b)) in self.error.iter_mut().zip(next.iter().zip(&self.half)) {
-                    *e = a.value - b.value;
-                }
-                let error = worst(&self.error, &self.allowed);
-                if error <= TRUSTED {
-                    self.trusted = indication.min(MOST_TRUSTED);
-                    self.per_indication = error / indication.max(f64::MIN_POSITIVE);
-                } else if error > 1.0 {
-                    self.trusted = self.trusted.min(0.5 * indication);
-                }
-                // The frame holds the end of the step again.
-                field.evaluate(&end, next, &mut self.end);
-                error
-            }
+            stages.explicit_error(step, first, &self.end, &mut self.error);
+            worst(&self.error, &self.allowed) / EMBEDDED
         };
         if error <= 1.0 && !self.rough && self.passes_a_switch(&integrator.field) {
-            self.trusted = 0.0;
             return Attempt::Switch;
         }
         Attempt::Error(error)

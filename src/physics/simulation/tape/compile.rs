@@ -339,6 +339,50 @@ impl Tape {
 }
 
 impl Builder<'_> {
+    /// What no derivative, delay or memory uses is computed at samples only, and its switches need not be resolved between them.
+    fn set_outputs_apart(&mut self, spec: &ModelSpec, memories: &[[u32; 3]]) {
+        let mut used = vec![false; self.level.len()];
+        let derivatives = spec.states().into_iter();
+        let derivatives = derivatives.map(|v| self.derivative[v.index()]);
+        let delays = (self.delays.iter()).flat_map(|d| [d.value as u32, d.time as u32]);
+        let memories = memories.iter().map(|m| m[0]);
+        for slot in derivatives.chain(delays).chain(memories) {
+            if let Some(used) = used.get_mut(slot as usize) {
+                *used = true;
+            }
+        }
+        // Operands stand before what uses them.
+        for (slot, x) in self.instructions.iter().rev() {
+            if !used[*slot as usize] {
+                continue;
+            }
+            for operand in [x.a, x.b, x.c] {
+                used[operand as usize] = true;
+            }
+            if let Operation::Curve(index) = x.operation {
+                for &value in &self.curves[index as usize].values {
+                    used[value as usize] = true;
+                }
+            }
+        }
+        let mut resolved = vec![false; self.switches.len()];
+        for (slot, x) in &self.instructions {
+            let slot = *slot as usize;
+            match x.operation {
+                Operation::Sign(index) | Operation::Switch { index, .. } if used[slot] => {
+                    resolved[index as usize] = true;
+                }
+                _ if !used[slot] && self.level[slot] == Level::States => {
+                    self.level[slot] = Level::Outputs;
+                }
+                _ => {}
+            }
+        }
+        for (switch, resolved) in self.switches.iter_mut().zip(resolved) {
+            switch.moves &= resolved;
+        }
+    }
+
     /// Renumbers the slots: leaves first, then instructions by level, each level in the order of emission.
     fn finish(
         mut self,
@@ -357,6 +401,7 @@ impl Builder<'_> {
         for (to, &from) in leaves.iter().enumerate() {
             place[from] = to as u32;
         }
+        self.set_outputs_apart(spec, memories);
         self.instructions
             .sort_by_key(|(slot, _)| self.level[*slot as usize]);
         for (i, (slot, _)) in self.instructions.iter().enumerate() {
@@ -368,7 +413,7 @@ impl Builder<'_> {
                 .filter(|(s, _)| self.level[*s as usize] <= level)
                 .count()
         };
-        let bounds = [count(Level::Parameters), count(Level::Inputs)];
+        let bounds = [Level::Parameters, Level::Inputs, Level::States].map(count);
         let mut sources = vec![None; slots];
         (0..slots).for_each(|s| sources[place[s] as usize] = self.sources[s]);
         let to = |s: u32| place[s as usize];

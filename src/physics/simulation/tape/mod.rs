@@ -2,7 +2,7 @@
 //!
 //! Each instruction writes the slot behind it, so that the tape is in single-assignment form. Instructions are sorted by what
 //! they depend on: parameters only (once a run), inputs (once a sample while inputs are held), states and time (each
-//! evaluation). A sweep carries `M` derivatives beside each value; what depends on no state and no parameter carries none.
+//! evaluation); what only outputs use comes last (once a sample). A sweep carries `M` derivatives beside each value; what depends on no state and no parameter carries none.
 //!
 //! Discontinuous switches (`sign`, comparisons) are ramps of a width that the caller sets. A ramp that the integrator resolves
 //! makes the derivative of the time of a switch part of the ordinary forward derivative, and sticking an ordinary stiff
@@ -67,6 +67,8 @@ enum Level {
     Parameters,
     Inputs,
     States,
+    /// States too, and no derivative uses it.
+    Outputs,
 }
 
 /// An argument of `delay`.
@@ -102,8 +104,8 @@ pub(super) struct Tape {
     pub(super) arch: Arch,
     /// Expression each slot computes, for messages.
     sources: Vec<Option<ExpressionId>>,
-    /// First instruction of the levels `Inputs` and `States`.
-    bounds: [usize; 2],
+    /// First instruction of each level but `Parameters`.
+    bounds: [usize; 3],
     leaves: usize,
     literals: Vec<(u32, f64)>,
     pub(super) time: usize,
@@ -157,11 +159,12 @@ impl Tape {
         match level {
             Level::Parameters => 0..self.bounds[0],
             Level::Inputs => self.bounds[0]..self.bounds[1],
-            Level::States => self.bounds[1]..self.instructions.len(),
+            Level::States => self.bounds[1]..self.bounds[2],
+            Level::Outputs => self.bounds[2]..self.instructions.len(),
         }
     }
 
-    /// How many instructions a derivative takes.
+    /// How many instructions the derivatives take.
     pub(crate) fn operations(&self) -> usize {
         self.part(Level::States).len()
     }
@@ -189,9 +192,14 @@ impl Tape {
         self.run(self.part(Level::Inputs), frame);
     }
 
-    /// All else.
+    /// Derivatives and what they use.
     pub(crate) fn run_states<const M: usize>(&self, frame: &mut Frame<M>) {
         self.run(self.part(Level::States), frame);
+    }
+
+    /// All else.
+    pub(crate) fn run_outputs<const M: usize>(&self, frame: &mut Frame<M>) {
+        self.run(self.part(Level::Outputs), frame);
     }
 
     /// The first expression that is not finite although its operands are: where a calculation goes wrong.

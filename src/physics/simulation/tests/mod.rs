@@ -189,3 +189,29 @@ fn work_is_counted_alike_at_each_run_and_with_what_counts_together() {
     assert!(plant.work() > 3 * one, "{} {one}", plant.work());
     assert_eq!(plant.clone().counting().work(), 0);
 }
+
+/// A dead zone in what is shown takes no steps of its own: between samples nothing uses it.
+#[test]
+fn what_only_an_output_uses_takes_no_steps() {
+    let text = |shown: &str| {
+        format!(
+            "model S parameter Real k = 1; input Real u; output Real y; Real x(start=0);
+             equation der(x) = u - k*x - 0.1*x^3; y = {shown}; end S;"
+        )
+    };
+    let u: Vec<f64> = (0..200).map(|k| (0.3 * f64::from(k)).sin()).collect();
+    let inputs: [&[f64]; 1] = [&u];
+    let excitation = held(&inputs, 0.1);
+    let run = |shown: &str| {
+        let plant = Plant::new(parse(&text(shown)).expect("a plant"));
+        let run = plant.simulate(&plant.nominal(), &excitation, None);
+        run.expect("a run")
+    };
+    let zone = run("if x > 0.2 then x - 0.2 elseif x < -0.2 then x + 0.2 else 0.0");
+    let plain = run("x");
+    assert_eq!(zone.plan.steps(), plain.plan.steps());
+    for (shown, x) in zone.outputs[0].iter().zip(&plain.outputs[0]) {
+        let expected = x.signum() * (x.abs() - 0.2).max(0.0);
+        assert!((shown - expected).abs() < 1e-12, "{shown} {expected}");
+    }
+}
