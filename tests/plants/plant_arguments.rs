@@ -90,3 +90,70 @@ fn an_exponential_law_is_found_from_its_curve() {
     let scale = number(&said, 0, "formula_s");
     assert!((scale - 0.4).abs() < 0.01, "{scale}");
 }
+
+/// The rate of a reaction grows with temperature as Arrhenius has it: five times from the coldest to the hottest.
+#[test]
+fn a_rate_constant_that_grows_with_temperature_is_a_law_of_it() {
+    let (flow, jacket) = (levels(31, 60.0, 140.0), levels(47, 318.0, 342.0));
+    let log = recorded(
+        "q [L/min],Tj [K],y1 [mol/L],y2 [K]",
+        (1500, 6.0),
+        &[&flow, &jacket],
+        |x, u, _| {
+            let (c, temperature) = (x[0], x[1]);
+            let k = 0.9 * (7000.0 * (1.0 / 350.0 - 1.0 / temperature)).exp();
+            let (rate, renewed) = (k * c, u[0] / 100.0);
+            let heat = 45.0 * rate - 1.2 * (temperature - u[1]);
+            vec![
+                (renewed * (1.0 - c) - rate) / 60.0,
+                (renewed * (350.0 - temperature) + heat) / 60.0,
+            ]
+        },
+        (&[0.4, 348.0], &[(0, 0.003), (1, 0.1)]),
+    );
+    let said = explained(
+        &Folder::new(),
+        &log,
+        "model Reactor\n  parameter Real k(unit=\"1/min\", min=0.5, max=1.5) = 0.8;\n  parameter Real h(unit=\"K.L/mol\", min=35, max=55) = 42;\n  parameter Real a(unit=\"1/min\", min=1, max=1.5) = 1.3;\n  constant Real V(unit=\"L\") = 100;\n  constant Real minute(unit=\"s/min\") = 60;\n  input Real q(unit=\"L/min\");\n  input Real Tj(unit=\"K\");\n  output Real y1(unit=\"mol/L\");\n  output Real y2(unit=\"K\");\n  Real c(unit=\"mol/L\", start=0.4);\n  Real T(unit=\"K\", start=348);\n  Real r(unit=\"mol/(L.min)\") = k*c;\nequation\n  minute*der(c) = q/V*(1 - c) - r;\n  minute*der(T) = q/V*(350 - T) + h*r - a*(T - Tj);\n  y1 = c;\n  y2 = T;\nend Reactor;\n",
+    );
+    assert_eq!(effects(&said), ["law"], "{}", said["summary"]);
+    let depends = &said["effects"][0]["depends"];
+    assert_eq!(depends, &serde_json::json!(["T", "k"]));
+}
+
+/// A thermometer in the sun shows more than the room has.
+#[test]
+fn a_sensor_that_feels_a_recorded_input_is_found() {
+    let heating = levels(37, 0.0, 3000.0);
+    let sun = |k: usize| 700.0 * (0.011 * k as f64).sin().max(0.0) * levels(13, 0.3, 1.0)(k);
+    let log = recorded(
+        "P [W],G [W/m2],y [degC]",
+        (1500, 60.0),
+        &[&heating, &sun],
+        |x, u, _| vec![(u[0] + 1.8 * u[1] - 120.0 * (x[0] - 5.0)) / 8.0e5],
+        (&[15.0], &[(0, 0.05)]),
+    );
+    let shown: Vec<String> = (log.lines().enumerate())
+        .map(|(row, line)| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let last = match row {
+                0 => cells[3].to_owned(),
+                _ => {
+                    let number = |i: usize| cells[i].parse::<f64>().unwrap();
+                    format!("{:.4}", number(3) + 0.004 * number(2))
+                }
+            };
+            [&cells[..3], &[last.as_str()]].concat().join(",")
+        })
+        .collect();
+    let said = explained(
+        &Folder::new(),
+        &(shown.join("\n") + "\n"),
+        "model Room\n  parameter Real C(unit=\"J/K\", min=6e5, max=1e6) = 8.6e5;\n  parameter Real h(unit=\"W/K\", min=90, max=150) = 112;\n  parameter Real A(unit=\"m2\", min=1, max=3) = 1.6;\n  input Real P(unit=\"W\");\n  input Real G(unit=\"W/m2\");\n  output Real y(unit=\"degC\");\n  Real T(unit=\"degC\", start=15);\nequation\n  C*der(T) = P + A*G - h*(T - 5);\n  y = T;\nend Room;\n",
+    );
+    assert_eq!(effects(&said), ["cross_coupling"], "{}", said["summary"]);
+    assert_eq!(said["effects"][0]["enters"], "y");
+    assert_eq!(said["effects"][0]["depends"], serde_json::json!(["G"]));
+    let feels = number(&said, 0, "cross_coupling_c");
+    assert!((feels - 0.004).abs() < 2e-4, "{feels}");
+}

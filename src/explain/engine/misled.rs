@@ -58,7 +58,7 @@ pub(super) fn integrates(
 }
 
 /// The inputs that react to what a fit leaves.
-pub(super) fn reacting_inputs(
+pub(in crate::explain::engine) fn reacting_inputs(
     study: &Study,
     fit: &Fit,
     recordings: &[PlantRecording],

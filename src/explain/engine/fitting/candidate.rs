@@ -4,7 +4,7 @@ use crate::explain::engine::fitting::edit::{Edit, NewParameter, Place, acting, l
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::names::is_without_units;
-use crate::explain::engine::terms::term::{Port, Starts};
+use crate::explain::engine::terms::term::{Needs, Port, Starts};
 use crate::explain::engine::terms::values::{FAST, about_usual, filled};
 use crate::explain::engine::thresholds::{GLANCED_ACCURACY, limited};
 use crate::physics::estimate::{Fit, PlantRecording, Study};
@@ -101,7 +101,7 @@ pub(crate) fn candidate(
     // The argument: for a sensor what it shows, for an input the input itself.
     let text = match (argument, lead.place) {
         (None, _) => String::new(),
-        (Some(_), Place::Equation(at)) if lead.sensor => {
+        (Some(_), Place::Equation(at)) if lead.sensor && term.needs != Needs::Another => {
             match spec.expressions.node(spec.equations[at].right) {
                 Node::Variable(_) => "{v}".to_owned(),
                 _ => "({v})".to_owned(),

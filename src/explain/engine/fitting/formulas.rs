@@ -37,8 +37,9 @@ const FORMULAS: &[Term] = &[
     law("abs({z})^{p}", &[shape("p", POWERS, true)]),
     // Hyperbolas, of what stays away from zero: a load of constant power.
     law("abs({z})^(-{q})", &[shape("q", POWERS, true)]),
-    law("exp({z}/{s})", &[shape("s", WIDTHS, true)]),
-    law("exp(-{z}/{s})", &[shape("s", WIDTHS, true)]),
+    // About a usual value: of an absolute temperature the strength at zero would be beyond all numbers.
+    law("exp(({z}{-usual})/{s})", &[shape("s", WIDTHS, true)]),
+    law("exp(-({z}{-usual})/{s})", &[shape("s", WIDTHS, true)]),
     // Through zero, where no parameter of the plant is the constant.
     law("exp({z}/{s}) - 1", &[shape("s", WIDTHS, true)]),
     law("exp(-{z}/{s}) - 1", &[shape("s", WIDTHS, true)]),
@@ -130,12 +131,10 @@ fn values_at(
         outputs: vec![vec![0.0; points.len()]],
         ..recordings.first()?.clone()
     };
-    let mut argument = argument.clone();
-    argument.set(vec![points.to_vec()], vec![points.to_vec()]);
     for instance in &mut instances {
         instance.argument = Some(0);
     }
-    let values = evaluate(&instances, &[argument], &[recording])?;
+    let values = evaluate(&instances, &[argument.at_points(points)], &[recording])?;
     let each = values.into_iter().map(|v| DVector::from_vec(v.concat()));
     Some(each.collect())
 }

@@ -183,7 +183,10 @@ pub(crate) fn screen(
                     && (!term.remembers_way() || a.reverses())
                     && match term.port {
                         Port::Input => a.variables.len() == 1 && inputs.contains(&a.variables[0]),
-                        Port::Sensor => a.variables.len() == 1 && shown.contains(&a.variables[0]),
+                        Port::Sensor => {
+                            term.needs == Needs::Another
+                                || a.variables.len() == 1 && shown.contains(&a.variables[0])
+                        }
                         Port::Equation | Port::Parameter => true,
                     }
             };
@@ -345,7 +348,12 @@ impl Tests<'_> {
             let o = outputs.iter().position(|&y| y == v)?;
             let shown = spec.expressions.node(spec.equations[at].rest);
             let own = argument.is_none_or(|a| {
-                a.variables == [v] || matches!(shown, Node::Variable(x) if a.variables == [x])
+                let own =
+                    a.variables == [v] || matches!(shown, Node::Variable(x) if a.variables == [x]);
+                match instance.term.needs {
+                    Needs::Another => !own && a.known_after.is_none_or(|k| k < at),
+                    _ => own,
+                }
             });
             let test = || {
                 let propagated = self.path.propagate(Entry::Sensor(o), &[(signal, signal)]);

@@ -9,6 +9,7 @@ use crate::explain::engine::fitting::candidate::{Candidate, candidate};
 use crate::explain::engine::fitting::edit::{Place, places};
 use crate::explain::engine::fitting::fitted::{Fitted, TIE, forms, searched, with_more};
 use crate::explain::engine::fitting::release::released;
+use crate::explain::engine::misled::reacting_inputs;
 use crate::explain::engine::screening::screen::{Lead, integrates};
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::library::TERMS;
@@ -16,7 +17,7 @@ use crate::explain::engine::terms::names::{called, named};
 use crate::explain::engine::terms::term::Needs;
 use crate::explain::engine::terms::values::grid;
 use crate::explain::engine::thresholds::{
-    COMPARED, FITTED, FOLLOWS, GLANCE, GLANCED_STEPS, MOST_STEPS, THOROUGH, times_more,
+    COMPARED, FITTED, FOLLOWS, GLANCE, GLANCED_STEPS, MOST_STEPS, NEEDED, THOROUGH, times_more,
 };
 use crate::physics::ModelSpec;
 use crate::physics::estimate::{Fit, Form, Study};
@@ -27,6 +28,9 @@ const NAMED_OF_A_FORM: usize = 2;
 
 /// Limits of what integrates that are fitted thoroughly: one of each kind.
 const LIMITS: usize = 3;
+
+/// Parts of its strength with which a term begins where the whole of it lets no run end.
+const WEAKER: &[f64] = &[0.3, 0.1, 0.03];
 
 /// The fit as a free run, with so many of its numbers.
 fn free_run(fit: &Fit, numbers: usize) -> Fit {
@@ -107,20 +111,23 @@ impl Candidates<'_> {
         // An observer finds the same from wherever it starts.
         let from = [(fit, self.origins.strays)].into_iter();
         let from = from.chain(self.origins.from_text.iter().map(|text| (text, false)));
-        let starts: Vec<(&Lead, (&Fit, bool))> = (leads.iter())
-            .flat_map(|lead| from.clone().map(move |from| (lead, from)))
+        // What the same start and effort leave without a limit.
+        let from: Vec<(&Fit, bool, f64)> = from
+            .map(|(fit, observed)| (fit, observed, self.without_limit(fit)))
+            .collect();
+        let starts: Vec<_> = (leads.iter())
+            .flat_map(|lead| from.iter().map(move |from| (lead, from)))
             .collect();
         let begun = starts
             .into_par_iter()
-            .filter_map(|(lead, (from, observed))| {
+            .filter_map(|(lead, &(from, observed, without))| {
                 let (begun, deviance) = self.begin_limit(lead, at, from)?;
                 // A free run that strays says little of which limit it is.
-                let order = if observed {
-                    f64::NEG_INFINITY
-                } else {
-                    deviance
+                let order = match observed {
+                    true => f64::NEG_INFINITY,
+                    false => deviance,
                 };
-                Some((order, begun, observed))
+                (observed || deviance < without - NEEDED).then_some((order, begun, observed))
             });
         let mut begun: Vec<(f64, Glanced, bool)> = begun.collect();
         begun.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -130,6 +137,15 @@ impl Candidates<'_> {
             .into_par_iter()
             .filter_map(|(_, begun, observed)| self.limit(begun, observed));
         each.flatten_iter().collect()
+    }
+
+    /// Deviance of the free run with white noise after a few steps without a limit; infinite where there is none.
+    fn without_limit(&self, from: &Fit) -> f64 {
+        let study = self.stage.study;
+        let start = study.gaussian(&free_run(from, study.nominal().len()));
+        let fit = start.and_then(|start| study.refit(&start, 0, GLANCE));
+        let fit = fit.and_then(|fit| study.gaussian(&fit));
+        fit.map_or(f64::INFINITY, |fit| fit.deviance)
     }
 
     /// A limit after a few steps of its fit in free run, and the deviance of that with white noise.
@@ -246,7 +262,16 @@ impl Candidates<'_> {
         let otherwise =
             text.or_else(|| study.off_bounds(from, self.stage.given.parameters().len()));
         let otherwise = otherwise.and_then(|text| glance(&made.from(&text, parameters)));
-        let fitted = (glance(&start).into_iter().chain(otherwise))
+        let begun = glance(&start).or_else(|| {
+            // A parameter that its term turns negative may stop the plant.
+            let weaker = lead.term.free_strength.then_some(WEAKER)?;
+            weaker.iter().find_map(|part| {
+                let mut start = start.clone();
+                start.point[parameters + made.values.len() - 1] *= part;
+                glance(&start)
+            })
+        });
+        let fitted = (begun.into_iter().chain(otherwise))
             .min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
         let again = |fit: &Fit| inner.refit(fit, 0, GLANCE);
         let fit = released(&inner, lead.term, parameters, fitted, &again);
@@ -289,6 +314,7 @@ impl Candidates<'_> {
                 fit.form == Form::Innovation
                     || inner.follows(fit) && still_shows((&inner, fit), &lead, &plant.spec)
             })
+            .filter(|fit| !self.answers((&inner, fit), &lead, arguments))
             .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
         let gain = before.criterion - best.criterion - searched(&lead, recordings);
         let argument = lead.argument.map(|a| &arguments[a]);
@@ -310,6 +336,20 @@ impl Candidates<'_> {
             likelier: false,
         };
         Some(fitted.depending_on(argument, &plant.spec, recordings))
+    }
+
+    /// Whether a term adds to a sensor an input that answers what the sensor shows: it would follow the noise.
+    fn answers(&self, (study, fit): (&Study, &Fit), lead: &Lead, arguments: &[Argument]) -> bool {
+        let spec = &self.stage.plant.spec;
+        let argument = lead.argument.filter(|_| lead.term.needs == Needs::Another);
+        let input = argument.and_then(|a| {
+            let inputs = spec.inputs();
+            inputs.iter().position(|u| arguments[a].variables == [*u])
+        });
+        input.is_some_and(|input| {
+            let reacting = reacting_inputs(study, fit, self.stage.recordings, study.hold());
+            reacting.contains(&input)
+        })
     }
 
     /// Where the best has no name, terms that have one at its place, whatever a glance said of them.

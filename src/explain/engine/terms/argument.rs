@@ -113,6 +113,15 @@ impl Argument {
         self.values = values;
     }
 
+    /// The same at points of its axis; its quantiles stay those of the recordings.
+    pub(crate) fn at_points(&self, points: &[f64]) -> Self {
+        Self {
+            values: vec![points.to_vec()],
+            ends: vec![points.to_vec()],
+            ..self.clone()
+        }
+    }
+
     /// The same with the values before an observer corrects them: what a sensor is expected to show.
     pub(crate) fn before_correction(&self) -> Self {
         let before = |(values, ends): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
@@ -236,6 +245,7 @@ impl Argument {
             Needs::Directed => turns || self.serves(Needs::OneWay),
             // It may begin at rest.
             Needs::OneWay => self.velocity && !turns,
+            Needs::Another => self.form == ArgumentForm::Variable,
             Needs::OwnState | Needs::Integrated => {
                 self.form == ArgumentForm::Variable && !self.held
             }

@@ -16,8 +16,9 @@ const FOR_A_WHILE: &str = "(if time > {t0} and time < {t0} + {T} then 1.0 else 0
 const WHILE: Shape = shape("T", Starts::Length(&[0.05, 0.1, 0.2, 0.4]), true);
 
 use Needs::{
-    AboutZero, AlongPath, Angle, Anything, BothSigns, Difference, Directed, Driven, Integrated,
-    OneWay, OwnState, Positive, Radiation, Stretch, SwitchedOn, Time, Turning, Velocity,
+    AboutZero, AlongPath, Angle, Another, Anything, BothSigns, Difference, Directed, Driven,
+    Integrated, OneWay, OwnState, Positive, Radiation, Stretch, SwitchedOn, Time, Turning,
+    Velocity,
 };
 use Port::{Equation, Input, Parameter, Sensor};
 
@@ -365,6 +366,14 @@ pub(crate) const TERMS: &[Term] = &[
         "({z}^2{-usual^2})",
         &[],
     ),
+    // Rates of reactions and conductivities with temperature, viscosities.
+    curve(
+        "parameter_exponential",
+        Parameter,
+        Anything,
+        "exp(({z}{-usual})/{s}) - 1",
+        &[shape("s", Starts::Spread(&[-2.0, -0.6, 0.6, 2.0]), false)],
+    ),
     // Gains that go round with an angle: eccentric magnets, gears, cranks.
     curve(
         "parameter_sine",
@@ -518,6 +527,8 @@ pub(crate) const TERMS: &[Term] = &[
         "{z} - {from}",
         &[shape("from", Starts::Quantiles(&[0.1, 0.5, 0.9]), false)],
     ),
+    // A thermometer in the sun, an accelerometer that leans.
+    curve("cross_coupling", Sensor, Another, "{z}", &[]),
     Term {
         id: "sensor_lag",
         port: Sensor,

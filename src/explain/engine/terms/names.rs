@@ -342,11 +342,13 @@ pub(crate) fn called(
             "temperature_dependent_resistance"
         }
         (Port::Parameter, "parameter_sine") => "position_dependent_gain",
-        (Port::Parameter, "parameter_curve" | "parameter_square") => match what {
-            Kind::Temperature if unit_of_place == "Ohm" => "temperature_dependent_resistance",
-            Kind::Position => "position_dependent_gain",
-            _ => "law",
-        },
+        (Port::Parameter, "parameter_curve" | "parameter_square" | "parameter_exponential") => {
+            match what {
+                Kind::Temperature if unit_of_place == "Ohm" => "temperature_dependent_resistance",
+                Kind::Position => "position_dependent_gain",
+                _ => "law",
+            }
+        }
         (Port::Equation, "signed_square") if what == Kind::Velocity => "quadratic_drag",
         // Turbulent losses of a pipe, in the equation of what flows through it.
         (Port::Equation, "signed_square") if *variables == [own] && is_flow(unit_of_place) => {

@@ -7,7 +7,7 @@ pub(crate) enum Port {
     Equation,
     /// An input, as a function of itself.
     Input,
-    /// A sensor, as a function of what it shows.
+    /// A sensor, as a function of what it shows or of another variable.
     Sensor,
     /// A parameter, as a function of variables of the plant.
     Parameter,
@@ -48,6 +48,8 @@ pub(crate) enum Needs {
     OwnState,
     /// Such a state that its own derivative does not depend on: what moves or fills as it is driven.
     Integrated,
+    /// Another variable than the sensor shows.
+    Another,
     /// What is switched on as each recording begins: it is not zero at the first sample, and may have been before.
     SwitchedOn,
     /// No argument: a function of time alone.

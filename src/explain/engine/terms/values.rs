@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use rayon::prelude::*;
+
 use crate::explain::engine::fitting::edit::literal;
 use crate::explain::engine::terms::argument::Argument;
 use crate::explain::engine::terms::term::{MEMORIES, Memory, MemoryStart, Starts, Term};
@@ -185,8 +187,31 @@ pub(in crate::explain::engine) fn evaluate_with_ends(
     values_and_ends(instances, arguments, recordings, Some(hold))
 }
 
-/// The ends are those of the values where no hold is given.
+/// The ends are those of the values where no hold is given. Each memory takes the steps that it needs itself.
 fn values_and_ends(
+    instances: &[Instance],
+    arguments: &[Argument],
+    recordings: &[PlantRecording],
+    hold: Option<Hold>,
+) -> Option<Vec<[Series; 2]>> {
+    let remembers = |&i: &usize| !instances[i].term.memories.is_empty();
+    let (alone, together): (Vec<_>, Vec<_>) = (0..instances.len()).partition(remembers);
+    let mut groups: Vec<Vec<usize>> = alone.into_iter().map(|i| vec![i]).collect();
+    groups.extend((!together.is_empty()).then_some(together));
+    let each = groups.into_par_iter().map(|group| {
+        let of_group: Vec<Instance> = group.iter().map(|&i| instances[i].clone()).collect();
+        let columns = values_of_group(&of_group, arguments, recordings, hold)?;
+        Some(group.into_iter().zip(columns).collect::<Vec<_>>())
+    });
+    let mut all: Vec<(usize, [Series; 2])> = (each.collect::<Option<Vec<_>>>()?.into_iter())
+        .flatten()
+        .collect();
+    all.sort_by_key(|of| of.0);
+    Some(all.into_iter().map(|of| of.1).collect())
+}
+
+/// The same in one run.
+fn values_of_group(
     instances: &[Instance],
     arguments: &[Argument],
     recordings: &[PlantRecording],

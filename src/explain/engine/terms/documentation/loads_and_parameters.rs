@@ -34,8 +34,8 @@ pub(super) const LOADS_AND_PARAMETERS: &[PlantEffect] = &[
     effect(
         "cross_coupling",
         "linear term that the equation lacks",
-        "C*der(x) = ... + c*z",
-        ANY_EQUATION,
+        "C*der(x) = ... + c*z, or y = x + c*z",
+        "an equation, or an output that copies a variable",
         "one variable of the plant",
         &[like(
             "parameters",
