@@ -5,11 +5,16 @@ use rayon::prelude::*;
 use crate::explain::engine::fitting::fitted::{Fitted, searched, with_more};
 use crate::explain::engine::screening::along::range_along;
 use crate::explain::engine::terms::names::{SPECIFIC, rank};
-use crate::explain::engine::thresholds::{FINISHED, MOST_STEPS, ROUNDS, THOROUGH, limited};
+use crate::explain::engine::thresholds::{
+    FINISHED, MOST_STEPS, ROUNDS, THOROUGH, limited, times_more,
+};
 use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 
 /// Names that gain this part of the best are finished too.
 const HALF: f64 = 0.5;
+
+/// How often fits begin again where the best has ended.
+const EXCHANGES: usize = 2;
 
 /// Smallest and largest value.
 type Range = (f64, f64);
@@ -25,6 +30,15 @@ pub(in crate::explain::engine) fn finished(
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let best = fitted.first().map_or(0.0, |f| f.gain);
     let spec = &study.plant().spec;
+    let refined_from = |f: &Fitted, start: &Fit| -> Option<(Fit, Option<Range>)> {
+        let options = with_more(options, f.candidate.values.len());
+        let limited = limited(f.candidate.plant.clone(), study, MOST_STEPS);
+        let inner = study.of(&limited, &options).ok()?;
+        let refined = inner.refit(start, ROUNDS, THOROUGH)?;
+        // Of a plant that the term has changed much, its variable has other values than before.
+        let range = range_along((&inner, &refined), recordings, &f.argument);
+        Some((refined, range))
+    };
     let refined: Vec<Option<(Fit, Option<Range>)>> = fitted
         .par_iter()
         .enumerate()
@@ -34,19 +48,10 @@ pub(in crate::explain::engine) fn finished(
             if i >= FINISHED && !named {
                 return None;
             }
-            let options = with_more(options, f.candidate.values.len());
-            let limited = limited(f.candidate.plant.clone(), study, MOST_STEPS);
-            let inner = study.of(&limited, &options).ok()?;
-            let refined = inner.refit(&f.fit, ROUNDS, THOROUGH)?;
-            // Of a plant that the term has changed much, its variable has other values than before.
-            let range = range_along((&inner, &refined), recordings, &f.argument);
-            Some((refined, range))
+            refined_from(f, &f.fit)
         })
         .collect();
-    for (f, refined) in fitted.iter_mut().zip(refined) {
-        let Some((refined, range)) = refined else {
-            continue;
-        };
+    let take = |f: &mut Fitted, (refined, range): (Fit, Option<Range>)| {
         f.range = range.unwrap_or(f.range);
         if refined.criterion < f.fit.criterion {
             f.gain = before.criterion - refined.criterion - searched(&f.lead, recordings);
@@ -54,7 +59,45 @@ pub(in crate::explain::engine) fn finished(
             f.shapes = refined.point[first..][..f.lead.shapes.len()].to_vec();
             f.fit = refined;
         }
+    };
+    for (f, refined) in fitted.iter_mut().zip(refined) {
+        if let Some(refined) = refined {
+            take(f, refined);
+        }
     }
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    // A likelihood with a noise model has several maxima, and chance would decide which name has found the best: each begins again
+    // where the best one ended, until that stays the best.
+    let first = study.parameters();
+    for _ in 0..EXCHANGES {
+        let Some(best) = fitted.first().filter(|f| f.gain > 0.0) else {
+            break;
+        };
+        let (most, others) = (best.gain, best.without_term(first));
+        let short = times_more(study.count().max(study.samples())) > 1;
+        let exchanged: Vec<Option<(Fit, Option<Range>)>> = fitted
+            .par_iter()
+            .enumerate()
+            .map(|(i, f)| {
+                let close = i < 2 * FINISHED && f.gain > HALF * most;
+                if i == 0 || !(short || close) || rank(spec, f) >= SPECIFIC {
+                    return None;
+                }
+                let mut start = f.candidate.from(&others, first);
+                let values = f.values();
+                start.point[first..][..values.len()].copy_from_slice(values);
+                refined_from(f, &start)
+            })
+            .collect();
+        for (f, refined) in fitted.iter_mut().zip(exchanged) {
+            if let Some(refined) = refined {
+                take(f, refined);
+            }
+        }
+        fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        if fitted[0].gain <= most {
+            break;
+        }
+    }
     fitted
 }
