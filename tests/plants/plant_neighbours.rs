@@ -291,7 +291,7 @@ fn a_limit_with_a_soft_knee_is_a_saturation() {
 fn a_load_that_ends_has_a_beginning_and_a_length() {
     let force = levels(25, 20.0, 90.0);
     let log = recorded(
-        "F [N],v [m/s]",
+        "F [N],y [m/s]",
         (1500, 1.0),
         &[&force],
         |x, u, t| {

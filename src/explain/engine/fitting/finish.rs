@@ -8,7 +8,7 @@ use crate::explain::engine::terms::names::{SPECIFIC, rank};
 use crate::explain::engine::thresholds::{
     FINISHED, MOST_STEPS, ROUNDS, THOROUGH, limited, times_more,
 };
-use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
+use crate::physics::estimate::{EstimateOptions, Fit, Form, PlantRecording, Study};
 
 /// Names that gain this part of the best are finished too.
 const HALF: f64 = 0.5;
@@ -30,11 +30,24 @@ pub(in crate::explain::engine) fn finished(
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let best = fitted.first().map_or(0.0, |f| f.gain);
     let spec = &study.plant().spec;
+    let short = times_more(study.count().max(study.samples())) > 1;
     let refined_from = |f: &Fitted, start: &Fit| -> Option<(Fit, Option<Range>)> {
         let options = with_more(options, f.candidate.values.len());
         let limited = limited(f.candidate.plant.clone(), study, MOST_STEPS);
         let inner = study.of(&limited, &options).ok()?;
-        let refined = inner.refit(start, ROUNDS, THOROUGH)?;
+        // Of few values several noise models have a maximum of their own: that of the start, white noise, and that of the plant without
+        // the term.
+        let mut starts = vec![start.clone()];
+        if short && start.form == Form::FreeRun {
+            starts.extend(inner.gaussian(start));
+            starts.extend((before.form == start.form).then(|| Fit {
+                noise: before.noise.clone(),
+                ..start.clone()
+            }));
+        }
+        let refined = (starts.into_iter())
+            .filter_map(|start| inner.refit(&start, ROUNDS, THOROUGH))
+            .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
         // Of a plant that the term has changed much, its variable has other values than before.
         let range = range_along((&inner, &refined), recordings, &f.argument);
         Some((refined, range))
@@ -74,7 +87,6 @@ pub(in crate::explain::engine) fn finished(
             break;
         };
         let (most, others) = (best.gain, best.without_term(first));
-        let short = times_more(study.count().max(study.samples())) > 1;
         let exchanged: Vec<Option<(Fit, Option<Range>)>> = fitted
             .par_iter()
             .enumerate()

@@ -229,6 +229,11 @@ impl Candidates<'_> {
             let close = |g: &&Glanced| {
                 g.gain > (1.0 - TIE.1) * most && is_specific(&g.lead, &origin.screen, spec)
             };
+            // A few steps may not do what the strongest test foretells.
+            let strongest = glanced.iter().filter(|g| g.origin == i);
+            let strongest = strongest.max_by(|a, b| a.lead.statistic.total_cmp(&b.lead.statistic));
+            let known = |g: &&Glanced| best.iter().any(|b| std::ptr::eq(*b, *g)) || close(g);
+            chosen.extend(strongest.filter(|g| !known(g)).cloned());
             chosen.extend(best.into_iter().cloned());
             chosen.extend(of_origin.filter(close).cloned());
         }
