@@ -338,7 +338,10 @@ fn a_parameter_that_comes_back_has_a_beginning_and_a_length() {
         "model Room\n  parameter Real C(unit=\"J/K\", min=3e5, max=5e5) = 4.3e5;\n  parameter Real h(unit=\"W/K\", min=70, max=110) = 84;\n  input Real P(unit=\"W\");\n  output Real y(unit=\"degC\");\n  Real T(unit=\"degC\", start=15);\nequation\n  C*der(T) = P - h*(T - 4);\n  y = T;\nend Room;\n",
     );
     assert_eq!(effects(&said), ["parameter_change"], "{}", said["summary"]);
-    assert_eq!(said["effects"][0]["enters"], "h");
-    let lasts = number(&said, 0, "parameter_change_T");
+    assert_eq!(
+        said["effects"][0]["depends"],
+        serde_json::json!(["time", "h"])
+    );
+    let lasts = number(&said, 0, "parameter_step_T");
     assert!((lasts - 15_000.0).abs() < 200.0, "{lasts}");
 }
