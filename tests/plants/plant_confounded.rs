@@ -8,7 +8,7 @@ use crate::plant_neighbours::{explained, levels, number, recorded};
 fn viscous_damping_of_free_swings_comes_first() {
     let log = recorded(
         "a",
-        (400, 0.1),
+        (130, 0.1),
         &[],
         |x, _, _| vec![x[1], -6.7 * x[0].sin() - 0.0164 * x[1]],
         (&[-0.285, 0.0], &[(0, 1e-3)]),

@@ -332,14 +332,11 @@ fn a_parameter_that_comes_back_has_a_beginning_and_a_length() {
         },
         (&[15.0], &[(0, 0.03)]),
     );
-    let folder = Folder::new();
-    folder.text("log.csv", &log);
-    folder.text(
-        "plant.mo",
+    let said = explained(
+        &Folder::new(),
+        &log,
         "model Room\n  parameter Real C(unit=\"J/K\", min=3e5, max=5e5) = 4.3e5;\n  parameter Real h(unit=\"W/K\", min=70, max=110) = 84;\n  input Real P(unit=\"W\");\n  output Real y(unit=\"degC\");\n  Real T(unit=\"degC\", start=15);\nequation\n  C*der(T) = P - h*(T - 4);\n  y = T;\nend Room;\n",
     );
-    // Beside all others a load at the same time is fitted first in some draws.
-    let said = folder.explained("log.csv", "plant.mo", &["--only", "parameter_change"]);
     assert_eq!(effects(&said), ["parameter_change"], "{}", said["summary"]);
     assert_eq!(
         said["effects"][0]["depends"],

@@ -25,6 +25,28 @@ pub(crate) fn users_of(spec: &ModelSpec, v: VariableId) -> Vec<VariableId> {
     users.iter().map(|e| e.unknown.variable()).collect()
 }
 
+/// These and, of those that have an equation of their own, what that is made of: a flow is a function of the level that drives it.
+pub(in crate::explain::engine) fn with_what_they_are_made_of(
+    spec: &ModelSpec,
+    variables: &[VariableId],
+) -> Vec<VariableId> {
+    let mut all = variables.to_vec();
+    let mut next = 0;
+    while let Some(&v) = all.get(next) {
+        next += 1;
+        let is_own = |e: &&Equation| e.unknown == Unknown::Value(v);
+        let made_of = spec.equations.iter().find(is_own);
+        for used in made_of.map_or_else(Vec::new, |e| spec.expressions.variables(e.rest)) {
+            let kind = spec.variable(used).kind;
+            let moves = !matches!(kind, VariableKind::Constant | VariableKind::Parameter);
+            if moves && !all.contains(&used) {
+                all.push(used);
+            }
+        }
+    }
+    all
+}
+
 /// Where something can enter the equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Place {

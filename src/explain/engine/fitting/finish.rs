@@ -2,13 +2,13 @@
 
 use rayon::prelude::*;
 
-use crate::explain::engine::fitting::fitted::{Fitted, searched, with_more};
+use crate::explain::engine::fitting::fitted::{Fitted, forms, searched, with_more};
 use crate::explain::engine::screening::along::range_along;
 use crate::explain::engine::terms::names::{SPECIFIC, rank};
 use crate::explain::engine::thresholds::{
     FINISHED, MOST_STEPS, ROUNDS, THOROUGH, limited, times_more,
 };
-use crate::physics::estimate::{EstimateOptions, Fit, Form, PlantRecording, Study};
+use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 
 /// Names that gain this part of the best are finished too.
 const HALF: f64 = 0.5;
@@ -30,84 +30,57 @@ pub(in crate::explain::engine) fn finished(
     fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let best = fitted.first().map_or(0.0, |f| f.gain);
     let spec = &study.plant().spec;
-    let short = times_more(study.count().max(study.samples())) > 1;
-    let refined_from = |f: &Fitted, start: &Fit| -> Option<(Fit, Option<Range>)> {
+    let first = study.parameters();
+    let refined = |f: &Fitted, start: Fit| -> Option<(Fit, Option<Range>)> {
         let options = with_more(options, f.candidate.values.len());
         let limited = limited(f.candidate.plant.clone(), study, MOST_STEPS);
         let inner = study.of(&limited, &options).ok()?;
-        // Of few values several noise models have a maximum of their own: that of the start, white noise, and that of the plant without
-        // the term.
-        let mut starts = vec![start.clone()];
-        if short && start.form == Form::FreeRun {
-            starts.extend(inner.gaussian(start));
-            starts.extend((before.form == start.form).then(|| Fit {
-                noise: before.noise.clone(),
-                ..start.clone()
-            }));
-        }
-        let refined = (starts.into_iter())
-            .filter_map(|start| inner.refit(&start, ROUNDS, THOROUGH))
+        let refined = (forms(start, before, study.gains()).iter())
+            .filter_map(|start| inner.refit(start, ROUNDS, THOROUGH))
             .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
         // Of a plant that the term has changed much, its variable has other values than before.
         let range = range_along((&inner, &refined), recordings, &f.argument);
         Some((refined, range))
     };
-    let refined: Vec<Option<(Fit, Option<Range>)>> = fitted
-        .par_iter()
-        .enumerate()
-        .map(|(i, f)| {
-            // A name must not lose to a curve for the steps that its fit lacks.
-            let named = rank(spec, f) < SPECIFIC && f.gain > HALF * best && i < 2 * FINISHED;
-            if i >= FINISHED && !named {
-                return None;
+    // Fits again all that have a start, and orders them.
+    let again = |fitted: &mut [Fitted], start: &(dyn Fn(usize, &Fitted) -> Option<Fit> + Sync)| {
+        fitted.par_iter_mut().enumerate().for_each(|(i, f)| {
+            let Some((fit, range)) = start(i, f).and_then(|start| refined(f, start)) else {
+                return;
+            };
+            f.range = range.unwrap_or(f.range);
+            if fit.criterion < f.fit.criterion {
+                f.gain = before.criterion - fit.criterion - searched(&f.lead, recordings);
+                f.shapes = fit.point[first..][..f.lead.shapes.len()].to_vec();
+                f.fit = fit;
             }
-            refined_from(f, &f.fit)
-        })
-        .collect();
-    let take = |f: &mut Fitted, (refined, range): (Fit, Option<Range>)| {
-        f.range = range.unwrap_or(f.range);
-        if refined.criterion < f.fit.criterion {
-            f.gain = before.criterion - refined.criterion - searched(&f.lead, recordings);
-            let first = options.free.len();
-            f.shapes = refined.point[first..][..f.lead.shapes.len()].to_vec();
-            f.fit = refined;
-        }
+        });
+        fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     };
-    for (f, refined) in fitted.iter_mut().zip(refined) {
-        if let Some(refined) = refined {
-            take(f, refined);
-        }
-    }
-    fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    // A likelihood with a noise model has several maxima, and chance would decide which name has found the best: each begins again
-    // where the best one ended, until that stays the best.
-    let first = study.parameters();
+    // A name must not lose to a curve for the steps that its fit lacks.
+    let is_named = |f: &Fitted| rank(spec, f) < SPECIFIC;
+    let close = |i: usize, f: &Fitted, best: f64| i < 2 * FINISHED && f.gain > HALF * best;
+    again(&mut fitted, &|i, f| {
+        (i < FINISHED || is_named(f) && close(i, f, best)).then(|| f.fit.clone())
+    });
+    // A likelihood has several maxima, and chance would decide which name has found the best: each begins again where the best one
+    // ended, until that stays the best.
+    let short = times_more(study.count().max(study.samples())) > 1;
     for _ in 0..EXCHANGES {
         let Some(best) = fitted.first().filter(|f| f.gain > 0.0) else {
             break;
         };
         let (most, others) = (best.gain, best.without_term(first));
-        let exchanged: Vec<Option<(Fit, Option<Range>)>> = fitted
-            .par_iter()
-            .enumerate()
-            .map(|(i, f)| {
-                let close = i < 2 * FINISHED && f.gain > HALF * most;
-                if i == 0 || !(short || close) || rank(spec, f) >= SPECIFIC {
-                    return None;
-                }
+        again(&mut fitted, &|i, f| {
+            let begins = i > 0 && is_named(f) && (short || close(i, f, most));
+            begins.then(|| {
                 let mut start = f.candidate.from(&others, first);
                 let values = f.values();
                 start.point[first..][..values.len()].copy_from_slice(values);
-                refined_from(f, &start)
+                start
             })
-            .collect();
-        for (f, refined) in fitted.iter_mut().zip(exchanged) {
-            if let Some(refined) = refined {
-                take(f, refined);
-            }
-        }
-        fitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        if fitted[0].gain <= most {
+        });
+        if fitted.first().is_none_or(|f| f.gain <= most) {
             break;
         }
     }

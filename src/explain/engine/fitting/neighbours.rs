@@ -2,17 +2,20 @@
 
 use rayon::prelude::*;
 
-use crate::explain::engine::fitting::edit::{Place, places};
+use crate::explain::engine::fitting::edit::{
+    Place, is_shared_term, literal, places, with_what_they_are_made_of,
+};
 use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
 use crate::explain::engine::fitting::formulas::{in_its_place, instead};
 use crate::explain::engine::hypothesis::Ground;
+use crate::explain::engine::screening::along::along;
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::{Argument, ArgumentForm};
 use crate::explain::engine::terms::library::TERMS;
 use crate::explain::engine::terms::names::{called, named, special_case};
 use crate::explain::engine::terms::richer::richer;
-use crate::explain::engine::terms::term::{Needs, Port, Term, curve};
-use crate::explain::engine::terms::values::{grid, starts};
+use crate::explain::engine::terms::term::{Needs, Port, Starts, Term, curve};
+use crate::explain::engine::terms::values::{about_usual, filled, grid, starts};
 use crate::explain::engine::thresholds::{FINISHED, GLANCE, MOST_STEPS, ROUNDS, THOROUGH, limited};
 use crate::physics::estimate::{Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Unknown, VariableId, VariableKind};
@@ -142,7 +145,7 @@ pub(in crate::explain::engine) fn also_elsewhere(
     if !plain || lead.sensor || lead.arrives.is_some() {
         return None;
     }
-    let of = &arguments[argument].variables;
+    let of = with_what_they_are_made_of(spec, &arguments[argument].variables);
     let own = lead.place.variable(spec);
     let others = places(spec, given).into_iter().filter_map(|place| {
         let Place::Equation(at) = place else {
@@ -150,15 +153,18 @@ pub(in crate::explain::engine) fn also_elsewhere(
         };
         let is_rate = matches!(spec.equations[at].unknown, Unknown::Derivative(_));
         // What flows out of a store depends on what is in it; an input may act on all.
-        let is_input = |v: &VariableId| spec.variable(*v).kind == VariableKind::Input;
+        let is_input = |v: &VariableId| {
+            use VariableKind::{Algebraic, Input};
+            matches!(spec.variable(*v).kind, Input | Algebraic)
+        };
         let is_source =
             of.contains(&place.variable(spec)) || of.contains(&own) || of.iter().all(is_input);
         (at != here && is_rate && is_source).then_some(at)
     });
     // Of a difference also each variable alone.
     let alone = |a: &usize| matches!(arguments[*a].variables[..], [one] if of.contains(&one) && of.len() > 1);
-    let serves = |a: &usize| arguments[*a].serves(lead.term.needs);
-    let singles = (0..arguments.len()).filter(alone).filter(serves);
+    let other = |a: &usize| *a != argument && alone(a) && arguments[*a].serves(lead.term.needs);
+    let singles = (0..arguments.len()).filter(other);
     let shapes_of = |a: usize| grid(lead.term, Some(&arguments[a]), ground.recordings, &[]);
     let singles = singles.flat_map(|a| shapes_of(a).into_iter().map(move |shapes| (a, shapes)));
     let functions: Vec<(usize, Vec<f64>)> = [(argument, fitted.shapes.clone())]
@@ -168,25 +174,111 @@ pub(in crate::explain::engine) fn also_elsewhere(
     let strength = fitted.strength();
     let mut leads: Vec<Lead> = Vec::new();
     for at in others {
-        let source = spec.equations[at].unknown.variable();
         for (argument, shapes) in &functions {
             let of = &arguments[*argument].variables;
-            let leaves_there = of.contains(&source) && !of.contains(&own);
             for there in ARRIVES.map(|part| -part * strength) {
-                let both = match leaves_there {
-                    true => [(at, there), (here, strength)],
-                    false => [(here, strength), (at, there)],
-                };
-                let mut new =
-                    (lead.clone()).at(Place::Equation(both[0].0), Some(*argument), shapes);
-                (new.strength, new.arrives) = (both[0].1, Some(both[1]));
-                leads.push(new);
+                let both = source_first(spec, of, [(here, strength), (at, there)]);
+                leads.push(in_both(lead, both, *argument, shapes));
             }
         }
     }
     let glanced =
         (leads.into_par_iter()).filter_map(|new| instead(fitted, new, &glance, arguments, ground));
     clearly_better(fitted, glanced, ground)
+}
+
+/// Equations that a term enters, and its strength there: first that of the variable that it is a function of, which it leaves.
+fn source_first(spec: &ModelSpec, of: &[VariableId], both: [(usize, f64); 2]) -> [(usize, f64); 2] {
+    let [one, other] = both;
+    let is_of = |at: usize| of.contains(&spec.equations[at].unknown.variable());
+    match is_of(other.0) && !is_of(one.0) {
+        true => [other, one],
+        false => both,
+    }
+}
+
+fn in_both(lead: &Lead, both: [(usize, f64); 2], argument: usize, shapes: &[f64]) -> Lead {
+    let [(first, strength), second] = both;
+    let mut new = lead
+        .clone()
+        .at(Place::Equation(first), Some(argument), shapes);
+    (new.strength, new.arrives) = (strength, Some(second));
+    new
+}
+
+/// A function of what several rates share, which has a name of ours, as one of the variables that this is made of. It begins with the same
+/// values along the fit.
+pub(in crate::explain::engine) fn of_what_is_shared(
+    fitted: &Fitted,
+    arguments: &[Argument],
+    ground: &Ground,
+) -> Option<Fitted> {
+    let (spec, lead) = (&ground.plant.spec, &fitted.lead);
+    let old = &arguments[lead.argument?];
+    let shared = |v: &VariableId| is_shared_term(spec, *v);
+    let plain = lead.term.free_strength && lead.term.memories.is_empty() && lead.curve.is_none();
+    if !plain || lead.term.form.contains("{a}") || !old.variables.iter().any(shared) {
+        return None;
+    }
+    let made_of = with_what_they_are_made_of(spec, &old.variables);
+    let others = arguments.iter().enumerate().filter(|(_, a)| {
+        let form = matches!(a.form, ArgumentForm::Variable | ArgumentForm::Difference);
+        let own = |v: &VariableId| made_of.contains(v) && !shared(v);
+        form && a.variables.iter().all(own) && a.serves(lead.term.needs)
+    });
+    let options = with_more(ground.options, fitted.candidate.values.len());
+    let study = ground.study.of(&fitted.candidate.plant, &options).ok()?;
+    let values = |texts: &[String]| along((&study, &fitted.fit), ground.recordings, texts);
+    let term_at = |argument: &Argument, shapes: &[f64]| {
+        let shapes: Vec<String> = shapes
+            .iter()
+            .map(|v| format!("({})", literal(*v)))
+            .collect();
+        let (form, times) = (lead.term.form, (0.0, ground.study.sample_time()));
+        let text = filled(form, lead.term, &argument.expression, &[], &shapes, times);
+        about_usual(&text, 0.0)
+    };
+    let anew = |(at, argument): (usize, &Argument)| {
+        let both = [&old.expression, &argument.expression].map(|text| text.to_owned());
+        let [from, to]: [Vec<f64>; 2] = values(&both)?.try_into().ok()?;
+        // Where the fit has this value of what is shared.
+        let there = |value: f64| {
+            let distance = |i: &usize| (from[*i] - value).abs();
+            let nearest = (0..from.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            nearest.map_or(value, |i| to[i])
+        };
+        let each = lead.term.shapes.iter().zip(&fitted.shapes);
+        let shapes: Vec<f64> = each
+            .map(|(shape, &value)| match shape.starts {
+                Starts::Quantiles(_) | Starts::SizeQuantiles(_) => there(value),
+                _ => value,
+            })
+            .collect();
+        let terms = [term_at(old, &fitted.shapes), term_at(argument, &shapes)];
+        let [was, is]: [Vec<f64>; 2] = values(&terms)?.try_into().ok()?;
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let part = product(&was, &is) / product(&is, &is);
+        let strength = fitted.strength() * part;
+        let new = match (lead.place, fitted.arrives()) {
+            (Place::Equation(here), Some((to, there))) => {
+                let both = [(here, strength), (to, there * part)];
+                let both = source_first(spec, &argument.variables, both);
+                in_both(lead, both, at, &shapes)
+            }
+            _ => {
+                let mut new = lead.clone().at(lead.place, Some(at), &shapes);
+                new.strength = strength;
+                new
+            }
+        };
+        let glanced = instead(fitted, new, &glance, arguments, ground)?;
+        thoroughly(glanced, ground)
+    };
+    let fits = others
+        .filter_map(anew)
+        .filter(|f| f.is_resolved(ground.study));
+    let best = fits.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+    (best.gain > fitted.gain - TIE.0).then_some(best)
 }
 
 /// Parts of a parameter by which it may change, and of the recording's length at which.

@@ -414,15 +414,28 @@ impl Tests<'_> {
             }
         }
         match shape.starts {
-            Starts::Instants(parts) if others.is_empty() => {
+            Starts::Instants(parts) => {
                 let mut rounds = Vec::new();
                 let mut step = self.study.duration() * (parts[1] - parts[0]);
                 while step > self.recordings[0].sample_time {
+                    // An end is found once its beginning is, and was tested at few lengths.
+                    rounds.extend(others.iter().flat_map(|_| [step, step]));
                     step /= BETWEEN as f64;
                     rounds.push(step);
                 }
-                let moved = |at: f64, k: f64, step: f64| Some(at + k * step);
-                let each = best.into_iter();
+                // The beginning, and, of what lasts, the end too.
+                let moved = |shapes: &[f64], k: f64, step: f64| {
+                    let by = k * step;
+                    match *shapes {
+                        [begin, length] => {
+                            vec![vec![begin + by, length - by], vec![begin, length + by]]
+                        }
+                        _ => vec![vec![shapes[0] + by]],
+                    }
+                };
+                let strongest = best.into_iter();
+                let strongest = strongest.max_by(|a, b| a.statistic.total_cmp(&b.statistic));
+                let each = strongest.into_iter();
                 each.flat_map(|b| self.rounds(b, &rounds, BETWEEN - 1, &moved))
                     .collect()
             }
@@ -438,9 +451,11 @@ impl Tests<'_> {
                     let (least, most) = tested.fold((f64::INFINITY, 0.0f64), |(least, most), l| {
                         (least.min(l.shapes[0]), most.max(l.shapes[0]))
                     });
-                    let moved = |at: f64, k: f64, step: f64| {
-                        let size = at * (k * step).exp();
-                        (least..=most).contains(&size).then_some(size)
+                    let moved = |shapes: &[f64], k: f64, step: f64| {
+                        let size = shapes[0] * (k * step).exp();
+                        let whole = [&[size], &shapes[1..]].concat();
+                        let tested = (least..=most).contains(&size);
+                        Vec::from_iter(tested.then_some(whole))
                     };
                     // The first round goes over all that were tested.
                     let count = (whole / first).ceil() as usize;
@@ -458,27 +473,28 @@ impl Tests<'_> {
         }
     }
 
-    /// So many steps of the first shape to either side of the best, which may move it, in each round.
+    /// So many steps of shapes to either side of the best, which may move it, in each round.
     fn rounds(
         &self,
         best: &Lead,
         steps: &[f64],
         count: usize,
-        moved: &dyn Fn(f64, f64, f64) -> Option<f64>,
+        moved: &dyn Fn(&[f64], f64, f64) -> Vec<Vec<f64>>,
     ) -> Vec<Lead> {
         let mut best = best.clone();
         let mut found = Vec::new();
         for &step in steps {
             let finer: Vec<Instance> = (1..=count)
                 .flat_map(|k| [-1.0, 1.0].map(|sign| sign * k as f64))
-                .filter_map(|k| {
-                    let mut shapes = best.shapes.clone();
-                    shapes[0] = moved(shapes[0], k, step)?;
-                    Some(Instance {
-                        term: best.term,
-                        argument: best.argument,
-                        shapes,
-                    })
+                .flat_map(|k| moved(&best.shapes, k, step))
+                .filter(|shapes| {
+                    let each = best.term.shapes.iter().zip(shapes);
+                    each.into_iter().all(|(s, v)| !s.positive || *v > 0.0)
+                })
+                .map(|shapes| Instance {
+                    term: best.term,
+                    argument: best.argument,
+                    shapes,
                 })
                 .collect();
             let leads: Vec<Lead> = match best.term.memories {

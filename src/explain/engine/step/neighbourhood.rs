@@ -7,7 +7,7 @@ use crate::explain::engine::fitting::fitted::{Fitted, TIE};
 use crate::explain::engine::fitting::formulas::formulas;
 use crate::explain::engine::fitting::neighbours::{
     also_elsewhere, as_parameter_changes, as_plain_functions, named_elsewhere, of_one_variable,
-    richer_form, simpler_form,
+    of_what_is_shared, richer_form, simpler_form,
 };
 use crate::explain::engine::fitting::refined_curve::refined_curve;
 use crate::explain::engine::hypothesis::Ground;
@@ -70,6 +70,9 @@ pub(super) fn add_neighbours(
         }
         if let Some(better) = also_elsewhere(one, stage.given, arguments, ground) {
             *one = better;
+        }
+        if let Some(of_its_own) = of_what_is_shared(one, arguments, ground) {
+            *one = of_its_own;
         }
     }
     let of_library = fitted.iter().filter(|f| f.hypothesis.is_none());
