@@ -186,6 +186,7 @@ pub(in crate::explain::engine) fn searched(lead: &Lead, recordings: &[PlantRecor
             Starts::Releases(_) => 2.0 * 100f64.ln(),
             Starts::Quantiles(_) | Starts::SizeQuantiles(_) => 2.5,
             Starts::Spread(_)
+            | Starts::PerSpread(_)
             | Starts::Samples(_)
             | Starts::Travel(_)
             | Starts::Moved(_)

@@ -236,7 +236,7 @@ pub(in crate::explain::engine) fn of_what_is_shared(
             .collect();
         let (form, times) = (lead.term.form, (0.0, ground.study.sample_time()));
         let text = filled(form, lead.term, &argument.expression, &[], &shapes, times);
-        about_usual(&text, 0.0)
+        about_usual(&text, argument.usual())
     };
     let anew = |(at, argument): (usize, &Argument)| {
         let both = [&old.expression, &argument.expression].map(|text| text.to_owned());

@@ -22,6 +22,8 @@ pub(crate) enum ArgumentForm {
     Product,
     /// The difference of the fourth powers of two absolute temperatures in 100 K.
     Radiation,
+    /// The reciprocal of an absolute temperature in K: rates of reactions are exponentials of it (Arrhenius).
+    Reciprocal,
     /// The size of what drives a velocity, with the sign of this: a loss in proportion to the force.
     Driven,
 }
@@ -217,6 +219,7 @@ impl Argument {
     pub(crate) fn serves(&self, needs: Needs) -> bool {
         if self.form == ArgumentForm::Product
             || self.form == ArgumentForm::Radiation && needs != Needs::Radiation
+            || self.form == ArgumentForm::Reciprocal && needs != Needs::Reciprocal
             || self.form == ArgumentForm::FromReference && needs != Needs::Difference
             || self.form == ArgumentForm::Driven && needs != Needs::Driven
         {
@@ -232,6 +235,7 @@ impl Argument {
             }
             Needs::Positive => self.quantile(0.0) >= 0.0,
             Needs::Radiation => self.form == ArgumentForm::Radiation,
+            Needs::Reciprocal => self.form == ArgumentForm::Reciprocal,
             Needs::Driven => self.form == ArgumentForm::Driven && both,
             Needs::Difference => {
                 let of_text = [ArgumentForm::Difference, ArgumentForm::FromReference];

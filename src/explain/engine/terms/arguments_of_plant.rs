@@ -61,28 +61,35 @@ pub(crate) fn arguments(spec: &ModelSpec) -> Vec<Argument> {
     found.extend(driven(spec, &simple));
     found.extend(from_references(spec, &simple));
     found.extend(sums(spec, &simple, &found));
-    // Bodies radiate to each other, and each to a room.
-    let fourth = |v: VariableId| match spec.variable(v).unit_text.as_deref() {
-        Some("K") => Some(format!("({}/100)^4", name(v))),
-        Some("degC") => Some(format!("(({} + 273.15)/100)^4", name(v))),
-        Some("degF") => Some(format!("(({} + 459.67)/180)^4", name(v))),
+    // Absolute temperatures, and how many of their units are 1 K.
+    let absolute = |v: VariableId| match spec.variable(v).unit_text.as_deref() {
+        Some("K") => Some((name(v), 1.0)),
+        Some("degC") => Some((format!("({} + 273.15)", name(v)), 1.0)),
+        Some("degF") => Some((format!("({} + 459.67)", name(v)), 1.8)),
         _ => None,
     };
-    let warm: Vec<(VariableId, String)> = simple
+    let warm: Vec<(VariableId, String, f64)> = simple
         .iter()
         .filter(|&&v| source(v))
-        .filter_map(|&v| Some((v, fourth(v)?)))
+        .filter_map(|&v| absolute(v).map(|(text, of_one)| (v, text, of_one)))
         .collect();
-    let mut radiation: Vec<(String, Vec<VariableId>)> = Vec::new();
-    for (i, (a, of_a)) in warm.iter().enumerate() {
-        for (b, of_b) in &warm[i + 1..] {
-            radiation.push((format!("({of_a} - {of_b})"), vec![*a, *b]));
+    let mut of_warm: Vec<(String, Vec<VariableId>, ArgumentForm)> = Vec::new();
+    // Bodies radiate to each other, and each to a room.
+    let fourth = |text: &str, of_one: f64| format!("({text}/{})^4", 100.0 * of_one);
+    for (i, (a, text, of_one)) in warm.iter().enumerate() {
+        let of_a = fourth(text, *of_one);
+        for (b, text, of_one) in &warm[i + 1..] {
+            let difference = format!("({of_a} - {})", fourth(text, *of_one));
+            of_warm.push((difference, vec![*a, *b], ArgumentForm::Radiation));
         }
-        radiation.push((format!("({of_a} - {ROOM})"), vec![*a]));
+        let to_room = format!("({of_a} - {ROOM})");
+        of_warm.push((to_room, vec![*a], ArgumentForm::Radiation));
+        let reciprocal = format!("{of_one}/{text}");
+        of_warm.push((reciprocal, vec![*a], ArgumentForm::Reciprocal));
     }
-    found.extend(radiation.into_iter().map(|(text, variables)| {
+    found.extend(of_warm.into_iter().map(|(text, variables, form)| {
         let mut argument = Argument::new(spec, text, variables);
-        (argument.form, argument.rate) = (ArgumentForm::Radiation, None);
+        (argument.form, argument.rate) = (form, None);
         argument
     }));
     found

@@ -17,8 +17,8 @@ const WHILE: Shape = shape("T", Starts::Length(&[0.05, 0.1, 0.2, 0.4]), true);
 
 use Needs::{
     AboutZero, AlongPath, Angle, Another, Anything, BothSigns, Difference, Directed, Driven,
-    Integrated, OneWay, OwnState, Positive, Radiation, Stretch, SwitchedOn, Time, Turning,
-    Velocity,
+    Integrated, OneWay, OwnState, Positive, Radiation, Reciprocal, Stretch, SwitchedOn, Time,
+    Turning, Velocity,
 };
 use Port::{Equation, Input, Parameter, Sensor};
 
@@ -373,6 +373,18 @@ pub(crate) const TERMS: &[Term] = &[
         Anything,
         "exp(({z}{-usual})/{s}) - 1",
         &[shape("s", Starts::Spread(&[-2.0, -0.6, 0.6, 2.0]), false)],
+    ),
+    // ... of reactions more exactly, with an activation temperature (Arrhenius).
+    curve(
+        "parameter_exponential",
+        Parameter,
+        Reciprocal,
+        "exp(-{E}*({z}{-usual})) - 1",
+        &[shape(
+            "E",
+            Starts::PerSpread(&[-1.5, -0.5, 0.5, 1.5]),
+            false,
+        )],
     ),
     // Gains that go round with an angle: eccentric magnets, gears, cranks.
     curve(

@@ -26,6 +26,8 @@ pub(crate) enum Needs {
     Positive,
     /// A difference of fourth powers of absolute temperatures.
     Radiation,
+    /// The reciprocal of an absolute temperature.
+    Reciprocal,
     /// A difference of two variables of one unit.
     Difference,
     /// The size of what drives a velocity, with the sign of this.
@@ -65,7 +67,9 @@ pub(crate) enum Starts {
     SizeQuantiles(&'static [f64]),
     /// Parts of the argument's standard deviation.
     Spread(&'static [f64]),
-    /// The same of sizes at which something snaps: what a recording says of them changes in jumps, and the screen looks between
+    /// Parts of its reciprocal.
+    PerSpread(&'static [f64]),
+    /// The same as [`Self::Spread`] of sizes at which something snaps: what a recording says of them changes in jumps, and the screen looks between
     /// these for the best.
     Releases(&'static [f64]),
     /// Wave numbers with every half period more in the range of an argument, and more of whole ones in an angle.

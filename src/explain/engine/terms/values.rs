@@ -45,6 +45,7 @@ pub(in crate::explain::engine) fn starts(
         Starts::Quantiles(parts) => of(parts, &|a, p| a.quantile(p)),
         Starts::SizeQuantiles(parts) => of(parts, &|a, p| a.size_quantile(p)),
         Starts::Spread(parts) | Starts::Releases(parts) => of(parts, &|a, p| p * a.spread()),
+        Starts::PerSpread(parts) => of(parts, &|a, p| p / a.spread()),
         Starts::Travel(parts) => of(parts, &|a, p| p * a.travel(h)),
         Starts::Rate(parts) => of(parts, &|a, p| p * a.range() / h),
         Starts::RateSize(parts) => of(parts, &|a, p| p * a.rate_size(h)),
@@ -240,13 +241,15 @@ fn values_of_group(
             let memories: Vec<String> = (0..instance.term.memories.len())
                 .map(|j| format!("m{i}_{j}"))
                 .collect();
+            // Far from it, such as at an absolute temperature of zero, an exponential is beyond all numbers.
+            let usual = instance.argument.map_or(0.0, |a| arguments[a].usual());
             // What stands at the place is what parameters scale, and a size of the term does not matter here.
             let fill = |argument: &str| {
                 let form = instance.term.form;
                 let text = filled(form, instance.term, argument, &memories, &shapes, times)
                     .replace("{v}", "0.0")
                     .replace("{a}", "1.0");
-                about_usual(&text, 0.0)
+                about_usual(&text, usual)
             };
             text.push_str(&format!("output Real b{i};\n"));
             equations.push_str(&format!("b{i} = {};\n", fill(&argument)));

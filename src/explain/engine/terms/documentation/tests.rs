@@ -57,6 +57,7 @@ fn names() -> BTreeSet<&'static str> {
                     // What an argument must be, as far as that does not depend on a recording.
                     let serves = match term.needs {
                         Needs::Radiation => argument.form == ArgumentForm::Radiation,
+                        Needs::Reciprocal => argument.form == ArgumentForm::Reciprocal,
                         Needs::Difference => argument.form == ArgumentForm::Difference,
                         Needs::Stretch => argument.serves(Needs::Stretch),
                         Needs::Angle => argument.angle,
