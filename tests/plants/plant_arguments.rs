@@ -119,6 +119,12 @@ fn a_rate_constant_that_grows_with_temperature_is_a_law_of_it() {
     assert_eq!(effects(&said), ["law"], "{}", said["summary"]);
     let depends = &said["effects"][0]["depends"];
     assert_eq!(depends, &serde_json::json!(["T", "k"]));
+    let activation = &said["effects"][0]["parameters"]["parameter_exponential_E"];
+    let (value, std) = (&activation["value"], &activation["std"]);
+    let (value, std) = (value.as_f64().unwrap(), std.as_f64().unwrap());
+    assert!(std < 150.0, "{activation}");
+    assert!((value - 7000.0).abs() < 4.0 * std, "{activation}");
+    assert_eq!(activation["unit"], "K");
 }
 
 /// A thermometer in the sun shows more than the room has.

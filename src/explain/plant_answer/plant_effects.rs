@@ -28,6 +28,14 @@ const MOST_POINTS: usize = 12;
 /// Step of the differences that give a law's slopes, as a part of a parameter.
 const DIFFERENCE: f64 = 1e-4;
 
+/// A difference of temperatures in degC is one in K.
+fn of_a_difference(unit: String) -> String {
+    match unit.as_str() {
+        "degC" => "K".to_owned(),
+        _ => unit,
+    }
+}
+
 /// The unit of the one variable that an effect depends on, as the text has it: an angle in degrees is no pure number to read.
 fn unit_of_argument(fitted: &Fitted, spec: &ModelSpec) -> Option<String> {
     let [name] = &fitted.depends[..] else {
@@ -69,7 +77,7 @@ impl Answer<'_> {
                 Quantity {
                     value: self.found.fit.point[at],
                     std: std.is_finite().then_some(std),
-                    unit: unit.unwrap_or_else(|| self.unit(name)),
+                    unit: unit.unwrap_or_else(|| of_a_difference(self.unit(name))),
                 },
             );
         }
