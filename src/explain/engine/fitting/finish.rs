@@ -3,8 +3,9 @@
 use rayon::prelude::*;
 
 use crate::explain::engine::fitting::fitted::{Fitted, forms, searched, with_more};
-use crate::explain::engine::screening::along::range_along;
+use crate::explain::engine::screening::along::{factor_along, range_along};
 use crate::explain::engine::terms::names::{SPECIFIC, rank};
+use crate::explain::engine::terms::values::expression;
 use crate::explain::engine::thresholds::{
     FINISHED, MOST_STEPS, ROUNDS, THOROUGH, limited, times_more,
 };
@@ -12,6 +13,9 @@ use crate::physics::estimate::{EstimateOptions, Fit, PlantRecording, Study};
 
 /// Names that gain this part of the best are finished too.
 const HALF: f64 = 0.5;
+
+/// Terms that explain this part of another's mean square are alike.
+const ALIKE: f64 = 0.9;
 
 /// How often fits begin again where the best has ended.
 const EXCHANGES: usize = 2;
@@ -71,12 +75,20 @@ pub(in crate::explain::engine) fn finished(
             break;
         };
         let (most, others) = (best.gain, best.without_term(first));
+        // What is like the best begins with its size: of much less its own fit may have ended elsewhere.
+        let alike = |f: &Fitted| strength_of_like(best, f, (study, options, recordings));
+        let strengths: Vec<Option<f64>> = fitted.par_iter().map(alike).collect();
         again(&mut fitted, &|i, f| {
-            let begins = i > 0 && is_named(f) && (short || close(i, f, most));
+            let like = strengths.get(i).copied().flatten();
+            let enough = short || close(i, f, most) || like.is_some();
+            let begins = i > 0 && is_named(f) && enough;
             begins.then(|| {
                 let mut start = f.candidate.from(&others, first);
                 let values = f.values();
                 start.point[first..][..values.len()].copy_from_slice(values);
+                if let Some(strength) = like {
+                    start.point[first + f.shapes.len()] = strength;
+                }
                 start
             })
         });
@@ -85,4 +97,30 @@ pub(in crate::explain::engine) fn finished(
         }
     }
     fitted
+}
+
+/// The strength with which a term at the same place does along the best fit what the best term does; none where it is not like it.
+fn strength_of_like(
+    best: &Fitted,
+    other: &Fitted,
+    (study, options, recordings): (&Study, &EstimateOptions, &[PlantRecording]),
+) -> Option<f64> {
+    let is_function = |f: &Fitted| {
+        let (term, own) = (f.lead.term, ["{a}", "{v}"]);
+        let of_itself = own.iter().any(|mark| term.form.contains(mark));
+        term.free_strength && term.memories.is_empty() && !of_itself && !f.argument.is_empty()
+    };
+    let functions = is_function(best) && is_function(other) && best.lead.curve.is_none();
+    if !functions || best.lead.place != other.lead.place || other.lead.curve.is_some() {
+        return None;
+    }
+    let text = |f: &Fitted| {
+        let of = (&f.argument[..], f.usual);
+        expression(f.lead.term, of, &f.shapes, study.sample_time())
+    };
+    let options = with_more(options, best.candidate.values.len());
+    let inner = study.of(&best.candidate.plant, &options).ok()?;
+    let texts = [text(best), text(other)];
+    let (factor, part) = factor_along((&inner, &best.fit), recordings, &texts)?;
+    (part > ALIKE).then_some(factor * best.strength())
 }

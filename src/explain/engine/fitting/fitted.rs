@@ -22,8 +22,8 @@ pub(crate) fn tie_with_curve(gain: f64) -> f64 {
 }
 /// Deviances that differ by less are equal: two, as Akaike's criterion has it for a number that says nothing.
 const ALIKE: f64 = 2.0;
-/// A term in proportion to what it is a function of.
-const LINE: &str = "linear";
+/// Terms without a number of their own that hold of themselves: what is in proportion to a variable, and the weight of a pendulum.
+const PLAIN: [&str; 2] = ["linear", "gravity"];
 /// A gain must not rest on so few values: they may be errors of the recording.
 const FEW: usize = 1;
 
@@ -266,15 +266,18 @@ pub(in crate::explain::engine) fn order(spec: &ModelSpec, fitted: &mut [Fitted],
             let key = |f: &Fitted| (supposes(f), rank(spec, f), f.candidate.new_states);
             (key(a).cmp(&key(b))).then(supported(b).total_cmp(&supported(a)))
         });
-        // Of functions that fit alike the line comes before its powers: friction of a slow motion is viscous.
+        // Of functions that fit alike the line comes before its powers: friction of a slow motion is viscous. The sine of an angle comes
+        // before its cube.
         let first = &fitted[0];
         let least = supported(first) - ALIKE;
-        let is_line = |f: &Fitted| f.lead.term.id == LINE && f.lead.place == first.lead.place;
-        let plain = |f: &Fitted| is_line(f) && rank(spec, f) == rank(spec, first);
-        let line = fitted[..equals]
+        let is_plain = |f: &Fitted| PLAIN.contains(&f.lead.term.id) && f.shapes.is_empty();
+        let plain = |f: &Fitted| {
+            is_plain(f) && f.lead.place == first.lead.place && rank(spec, f) == rank(spec, first)
+        };
+        let at = fitted[..equals]
             .iter()
             .position(|f| plain(f) && supported(f) >= least);
-        if let Some(at) = line {
+        if let Some(at) = at {
             fitted[..=at].rotate_right(1);
         }
         prefer_special_case(spec, fitted);

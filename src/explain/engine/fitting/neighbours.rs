@@ -3,19 +3,19 @@
 use rayon::prelude::*;
 
 use crate::explain::engine::fitting::edit::{
-    Place, is_shared_term, literal, places, with_what_they_are_made_of,
+    Place, is_shared_term, places, with_what_they_are_made_of,
 };
 use crate::explain::engine::fitting::fitted::{Fitted, TIE, with_more};
 use crate::explain::engine::fitting::formulas::{in_its_place, instead};
 use crate::explain::engine::hypothesis::Ground;
-use crate::explain::engine::screening::along::along;
+use crate::explain::engine::screening::along::{along, factor_along};
 use crate::explain::engine::screening::screen::Lead;
 use crate::explain::engine::terms::argument::{Argument, ArgumentForm};
 use crate::explain::engine::terms::library::TERMS;
 use crate::explain::engine::terms::names::{called, named, special_case};
 use crate::explain::engine::terms::richer::richer;
 use crate::explain::engine::terms::term::{Needs, Port, Starts, Term, curve};
-use crate::explain::engine::terms::values::{about_usual, filled, grid, starts};
+use crate::explain::engine::terms::values::{expression, grid, starts};
 use crate::explain::engine::thresholds::{FINISHED, GLANCE, MOST_STEPS, ROUNDS, THOROUGH, limited};
 use crate::physics::estimate::{Fit, PlantRecording, Study};
 use crate::physics::{ModelSpec, Unknown, VariableId, VariableKind};
@@ -230,13 +230,8 @@ pub(in crate::explain::engine) fn of_what_is_shared(
     let study = ground.study.of(&fitted.candidate.plant, &options).ok()?;
     let values = |texts: &[String]| along((&study, &fitted.fit), ground.recordings, texts);
     let term_at = |argument: &Argument, shapes: &[f64]| {
-        let shapes: Vec<String> = shapes
-            .iter()
-            .map(|v| format!("({})", literal(*v)))
-            .collect();
-        let (form, times) = (lead.term.form, (0.0, ground.study.sample_time()));
-        let text = filled(form, lead.term, &argument.expression, &[], &shapes, times);
-        about_usual(&text, argument.usual())
+        let of = (&argument.expression[..], argument.usual());
+        expression(lead.term, of, shapes, ground.study.sample_time())
     };
     let anew = |(at, argument): (usize, &Argument)| {
         let both = [&old.expression, &argument.expression].map(|text| text.to_owned());
@@ -255,9 +250,7 @@ pub(in crate::explain::engine) fn of_what_is_shared(
             })
             .collect();
         let terms = [term_at(old, &fitted.shapes), term_at(argument, &shapes)];
-        let [was, is]: [Vec<f64>; 2] = values(&terms)?.try_into().ok()?;
-        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let part = product(&was, &is) / product(&is, &is);
+        let (part, _) = factor_along((&study, &fitted.fit), ground.recordings, &terms)?;
         let strength = fitted.strength() * part;
         let new = match (lead.place, fitted.arrives()) {
             (Place::Equation(here), Some((to, there))) => {

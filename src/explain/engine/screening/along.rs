@@ -20,6 +20,20 @@ pub(in crate::explain::engine) fn range_along(
     Some((from, values.iter().copied().max_by(f64::total_cmp)?))
 }
 
+/// The factor that brings the second of two expressions nearest to the first along the predictions of a plant, and the part of the first's
+/// mean square that it explains then.
+pub(in crate::explain::engine) fn factor_along(
+    fitted: (&Study, &Fit),
+    recordings: &[PlantRecording],
+    texts: &[String; 2],
+) -> Option<(f64, f64)> {
+    let [wanted, own]: [Vec<f64>; 2] = along(fitted, recordings, texts)?.try_into().ok()?;
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let factor = product(&wanted, &own) / product(&own, &own);
+    let part = factor * product(&wanted, &own) / product(&wanted, &wanted);
+    part.is_finite().then_some((factor, part))
+}
+
 /// Values of expressions in the variables of a plant along its predictions, for all recordings one after the other.
 pub(in crate::explain::engine) fn along(
     (study, fit): (&Study, &Fit),

@@ -305,6 +305,8 @@ pub(crate) const TERMS: &[Term] = &[
     ),
     curve("sine", Equation, AlongPath, "sin({k}*{z} + {p})", WAVE),
     curve("gravity", Equation, Angle, "sin({z})", &[]),
+    // A plant that was linearised about its rest has the angle in the place of its sine.
+    curve("gravity", Equation, Angle, "sin({z}) - {z}", &[]),
     curve(
         "gravity",
         Equation,
@@ -385,6 +387,14 @@ pub(crate) const TERMS: &[Term] = &[
             Starts::PerSpread(&[-1.5, -0.5, 0.5, 1.5]),
             false,
         )],
+    ),
+    // A gain of an angle that stands for its sine, also beside another factor.
+    curve(
+        "parameter_of_sine",
+        Parameter,
+        Angle,
+        "(if abs({z}) > 1e-6 then sin({z})/{z} else 1.0) - 1",
+        &[],
     ),
     // Gains that go round with an angle: eccentric magnets, gears, cranks.
     curve(

@@ -342,6 +342,7 @@ pub(crate) fn called(
             "temperature_dependent_resistance"
         }
         (Port::Parameter, "parameter_sine") => "position_dependent_gain",
+        (Port::Parameter, "parameter_of_sine") => "gravity_torque",
         (Port::Parameter, "parameter_curve" | "parameter_square" | "parameter_exponential") => {
             match what {
                 Kind::Temperature if unit_of_place == "Ohm" => "temperature_dependent_resistance",

@@ -146,6 +146,22 @@ pub(crate) fn filled(
     text
 }
 
+/// A term without memories as an expression of its argument.
+pub(in crate::explain::engine) fn expression(
+    term: &Term,
+    (argument, usual): (&str, f64),
+    shapes: &[f64],
+    sample_time: f64,
+) -> String {
+    let shapes = shapes.iter().map(|v| format!("({})", literal(*v)));
+    let shapes: Vec<String> = shapes.collect();
+    let times = (0.0, sample_time);
+    about_usual(
+        &filled(term.form, term, argument, &[], &shapes, times),
+        usual,
+    )
+}
+
 /// The form with the usual value of its argument in it, where that is not zero.
 pub(crate) fn about_usual(form: &str, usual: f64) -> String {
     let value = match usual {

@@ -224,9 +224,9 @@ pub(super) const FORCES: &[PlantEffect] = &[
     effect(
         "gravity_torque",
         "torque of gravity",
-        "J*der(w) = ... + c*sin(phi), or c*sin(phi + p) for a mounting that is not upright",
+        "J*der(w) = ... + c*sin(phi), c*sin(phi + p) for a mounting that is not upright, or c*(sin(phi) - phi) where the text is linearised",
         ANY_EQUATION,
-        "an angle in rad that covers half a turn or more",
+        "an angle in rad: for the first two, one that covers half a turn or more",
         &[like(
             "cogging",
             "Turn slowly through several turns: gravity repeats once a turn.",
