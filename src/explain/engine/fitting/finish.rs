@@ -75,19 +75,26 @@ pub(in crate::explain::engine) fn finished(
             break;
         };
         let (most, others) = (best.gain, best.without_term(first));
-        // What is like the best begins with its size: of much less its own fit may have ended elsewhere.
-        let alike = |f: &Fitted| strength_of_like(best, f, (study, options, recordings));
-        let strengths: Vec<Option<f64>> = fitted.par_iter().map(alike).collect();
+        // What is like a better one begins where that ended, with its size: of much less its own fit may have ended elsewhere.
+        let like = |i: usize| {
+            let better = fitted[..i].iter().take(FINISHED);
+            better.into_iter().find_map(|b| {
+                let strength = strength_of_like(b, &fitted[i], (study, options, recordings))?;
+                Some((b.without_term(first), strength))
+            })
+        };
+        let likes: Vec<Option<(Fit, f64)>> = (0..fitted.len()).into_par_iter().map(like).collect();
         again(&mut fitted, &|i, f| {
-            let like = strengths.get(i).copied().flatten();
+            let like = likes.get(i).and_then(Option::as_ref);
             let enough = short || close(i, f, most) || like.is_some();
             let begins = i > 0 && is_named(f) && enough;
             begins.then(|| {
-                let mut start = f.candidate.from(&others, first);
+                let from = like.map_or(&others, |(from, _)| from);
+                let mut start = f.candidate.from(from, first);
                 let values = f.values();
                 start.point[first..][..values.len()].copy_from_slice(values);
-                if let Some(strength) = like {
-                    start.point[first + f.shapes.len()] = strength;
+                if let Some((_, strength)) = like {
+                    start.point[first + f.shapes.len()] = *strength;
                 }
                 start
             })
