@@ -190,3 +190,28 @@ fn a_parameter_takes_its_time_to_change() {
     assert!((59.0..67.0).contains(&begin), "{begin}");
     assert!((5.0..11.0).contains(&time), "{time}");
 }
+
+/// A pendulum whose simulation was linearised about its rest: the angle stands where the plant has its sine, a spring would have a cube.
+#[test]
+fn gravity_of_a_linearised_pendulum_is_no_cubic_spring() {
+    let torque = levels(61, -4.0, 4.0);
+    let log = recorded(
+        "M [N.m],a [rad]",
+        (1200, 0.05),
+        &[&torque],
+        |x, u, _| vec![x[1], u[0] / 1.3 - 7.1 * x[0].sin() - 0.11 * x[1]],
+        (&[0.5, 0.0], &[(0, 3e-3)]),
+    );
+    let said = explained(
+        &Folder::new(),
+        &log,
+        "model Arm\n  parameter Real J(unit=\"kg.m2\", min=1, max=1.6) = 1.25;\n  parameter Real k(unit=\"1/s2\", min=5, max=9) = 6.8;\n  parameter Real d(unit=\"1/s\", min=0, max=0.5) = 0.1;\n  input Real M(unit=\"N.m\");\n  output Real a(unit=\"rad\");\n  Real phi(unit=\"rad\", start=0.5);\n  Real w(unit=\"rad/s\");\nequation\n  der(phi) = w;\n  der(w) = M/J - k*phi - d*w;\n  a = phi;\nend Arm;\n",
+    );
+    assert_eq!(effects(&said), ["gravity_torque"], "{}", said["summary"]);
+    let parameters = said["effects"][0]["parameters"].as_object().unwrap();
+    let strength = parameters.values().next().unwrap()["value"].as_f64();
+    assert!(
+        strength.is_some_and(|c| (c.abs() - 7.1).abs() < 0.05),
+        "{parameters:?}"
+    );
+}

@@ -22,6 +22,8 @@ const IN_A_TURN: [f64; 22] = [
 const PERIODS: u32 = 48;
 /// Wave numbers that are tried of a position: every half period from the first.
 pub(in crate::explain::engine) const WAVES: u32 = 2 * PERIODS - 1;
+/// An argument is far from zero whose usual value is more than so many standard deviations.
+const FAR: f64 = 10.0;
 /// A memory that follows at once does so in a sample divided by this.
 pub(in crate::explain::engine) const FAST: f64 = 5.0;
 
@@ -257,8 +259,10 @@ fn values_of_group(
             let memories: Vec<String> = (0..instance.term.memories.len())
                 .map(|j| format!("m{i}_{j}"))
                 .collect();
-            // Far from it, such as at an absolute temperature of zero, an exponential is beyond all numbers.
-            let usual = instance.argument.map_or(0.0, |a| arguments[a].usual());
+            // Far from zero, such as at absolute temperatures, an exponential about zero is beyond all numbers.
+            let far = |a: &&Argument| a.usual().abs() > FAR * a.spread();
+            let usual = instance.argument.map(|a| &arguments[a]).filter(far);
+            let usual = usual.map_or(0.0, Argument::usual);
             // What stands at the place is what parameters scale, and a size of the term does not matter here.
             let fill = |argument: &str| {
                 let form = instance.term.form;
