@@ -273,6 +273,9 @@ struct Tests<'a> {
     projection: &'a Projection,
 }
 
+/// Values of shapes to test, from the best ones, so many steps of this size away.
+type Moved<'a> = dyn Fn(&[f64], f64, f64) -> Vec<Vec<f64>> + 'a;
+
 impl Tests<'_> {
     /// Tests terms at every place that takes them.
     fn of(&self, chunk: &[Instance]) -> Vec<Lead> {
@@ -474,13 +477,7 @@ impl Tests<'_> {
     }
 
     /// So many steps of shapes to either side of the best, which may move it, in each round.
-    fn rounds(
-        &self,
-        best: &Lead,
-        steps: &[f64],
-        count: usize,
-        moved: &dyn Fn(&[f64], f64, f64) -> Vec<Vec<f64>>,
-    ) -> Vec<Lead> {
+    fn rounds(&self, best: &Lead, steps: &[f64], count: usize, moved: &Moved) -> Vec<Lead> {
         let mut best = best.clone();
         let mut found = Vec::new();
         for &step in steps {
